@@ -1,0 +1,2 @@
+//! Dynamixel Protocol 2.0 on bytes alone: frames, instructions, statuses, for host and device.
+#![no_std]

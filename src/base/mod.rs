@@ -1,0 +1,10 @@
+//! What every floor shares: time, the clock trait, joint targets and states, small helpers.
+
+pub mod angle;
+pub mod joints;
+pub mod suggest;
+pub mod time;
+
+pub use angle::wrap_pi;
+pub use joints::JointState;
+pub use time::{Clock, Time, VirtualClock};

@@ -1,0 +1,1 @@
+//! Pose spaces: what the animator needs to know of a body.

@@ -1,0 +1,35 @@
+//! The command line: one file per command, exit codes, messages.
+
+mod failure;
+
+pub use failure::{ExitStatus, Failure};
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// A performer's hands, body or face bring a robot to life.
+#[derive(Parser, Debug)]
+#[command(name = "handwave", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {}
+
+/// Parses the command line, runs the command, prints its failure and returns its exit code.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome: Result<ExitStatus, Failure> = match cli.command {
+        None => Ok(ExitStatus::Done),
+        Some(command) => match command {},
+    };
+    match outcome {
+        Ok(status) => status.into(),
+        Err(failure) => {
+            eprintln!("handwave: {failure}");
+            failure.status.into()
+        }
+    }
+}

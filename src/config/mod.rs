@@ -1,0 +1,1 @@
+//! Typed configuration, checked at load.

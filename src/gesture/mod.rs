@@ -1,0 +1,1 @@
+//! Gestures: definition from one example, planes, wave estimators.

@@ -1,0 +1,1 @@
+//! Runs the puppet: clock, control loop, safety.

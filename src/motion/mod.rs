@@ -1,0 +1,1 @@
+//! Motion: clips, classes, graph, transitions.

@@ -1,0 +1,1 @@
+//! Robot: URDF model, kinematics, envelope.
