@@ -1,1 +1,20 @@
-//! Motion: clips, classes, graph, transitions.
+//! Motion: clips, classes, graph, transitions, synthesis.
+//!
+//! [`clip`] holds one example motion, [`gait`] authors clips for legged robots, [`class`] is a space
+//! of clips indexed by amplitude and frequency, [`graph`] moves between classes, [`animator`] is
+//! the whole: gesture waves in, poses out.
+
+pub mod animator;
+pub mod class;
+pub mod clip;
+pub mod gait;
+pub mod gait_frames;
+pub mod graph;
+pub mod layer;
+pub mod range;
+mod smooth;
+mod spline;
+pub mod weights;
+
+pub use animator::Animator;
+pub use clip::{Clip, ClipError};

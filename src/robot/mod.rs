@@ -1,1 +1,13 @@
-//! Robot: URDF model, kinematics, envelope.
+//! Robot: URDF model, kinematics, legs, envelope.
+//!
+//! [`model`] reads and checks a URDF, [`kinematics`] places its links, [`leg`] finds legs and
+//! solves them, [`envelope`] is the last thing every target passes before it leaves.
+
+pub mod envelope;
+pub mod kinematics;
+pub mod leg;
+pub mod model;
+
+pub use envelope::{Envelope, JointEnvelope};
+pub use leg::Leg;
+pub use model::{JointLimits, ModelError, RobotModel};

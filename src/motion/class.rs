@@ -1,0 +1,476 @@
+//! Motion classes: a space of example clips, played by a gesture's amplitude, frequency and phase.
+//!
+//! Rhodin 2016, section 9.5.2. A cyclic class blends its clips at a common phase that is locked to
+//! the gesture's; every limb keeps its own timeline (eq. 9.7). A path class is driven by progression.
+
+use super::clip::{Clip, ClipKind, RootAdvance};
+use super::range::{JointRange, Steepness};
+use super::smooth::Follower;
+use super::weights::{Parameters, Weights, WeightsError};
+use crate::base::angle::{wrap_pi, wrap_tau};
+use crate::body::PoseSpace;
+use std::f64::consts::TAU;
+
+/// What drives a class at one instant.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct Drive {
+    /// Amplitude of the gesture (1 = as large as shown), or progression of a non-cyclic one.
+    pub amplitude: f64,
+    /// Frequency, Hz; negative when performed in the opposite sense.
+    pub frequency_hz: f64,
+    /// Phase at this instant, rad.
+    pub phase_rad: f64,
+}
+
+/// An example clip with its parameters.
+#[derive(Clone, Debug)]
+pub struct Example {
+    /// The clip.
+    pub clip: Clip,
+    /// Amplitude and frequency at which it is played pure.
+    pub parameters: Parameters,
+}
+
+/// Why a class cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub enum ClassError {
+    /// Cycles and paths in one class.
+    #[error(
+        "class {class}: clip {clip} is a {found}, the others are not; a class has clips of one kind"
+    )]
+    MixedKinds {
+        /// Class name.
+        class: String,
+        /// The odd clip.
+        clip: String,
+        /// Its kind.
+        found: &'static str,
+    },
+    /// Parameters that span no space.
+    #[error("class {class}: {source}")]
+    Weights {
+        /// Class name.
+        class: String,
+        /// What is wrong with the parameters.
+        source: WeightsError,
+    },
+    /// Limbs differ between clips.
+    #[error(
+        "class {class}: clip {clip} has no segment {segment}, other clips have; author all clips of a class for the same legs"
+    )]
+    Limbs {
+        /// Class name.
+        class: String,
+        /// The odd clip.
+        clip: String,
+        /// The missing limb.
+        segment: String,
+    },
+}
+
+/// Movements smaller than this part of the gesture are taken for rest: tremor does not move the puppet.
+const REST_AMPLITUDE: f64 = 0.04;
+/// From here on amplitude counts in full.
+const FULL_FROM_AMPLITUDE: f64 = 0.15;
+/// Share of the joints' speed and acceleration that a steady cycle may use; the rest is for changes
+/// of weights, timelines and phase.
+const RANGE_SHARE: f64 = 0.72;
+/// The stride is shortened to this part before phase lock is given up.
+const LEAST_STRIDE: f64 = 0.4;
+/// Limbs may gain or lose this part of the phase advance against the body (thesis: 0.95..1.05).
+const LIMB_ADVANCE: f64 = 0.05;
+
+/// A class and its state while it is played.
+#[derive(Clone, Debug)]
+pub struct MotionClass {
+    /// Class name.
+    pub name: String,
+    examples: Vec<Example>,
+    kind: ClipKind,
+    weights_map: Weights,
+    steepness: Steepness,
+    ranges: Vec<JointRange>,
+    /// Joints x 1: limb of each joint.
+    limb_of: Vec<Option<usize>>,
+    /// Examples x limbs: offset of the limb's timeline against the reference clip, rad; `None` for a
+    /// clip without moving limbs.
+    offsets: Vec<Option<Vec<f64>>>,
+    lock_rate: f64,
+    state: State,
+    // Work space, so that a step allocates nothing.
+    sampled: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+struct State {
+    amplitude: Follower,
+    frequency: Follower,
+    phase: f64,
+    /// Phase speed, rad/s.
+    rate: f64,
+    /// Limb timelines against the common phase, rad.
+    limb_shift: Vec<f64>,
+    locked: bool,
+    stride: f64,
+}
+
+/// What a class did in one step, for the view and for tests.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct Played {
+    /// Phase of the class, rad; progression of a path.
+    pub phase_rad: f64,
+    /// Frequency being played, Hz.
+    pub frequency_hz: f64,
+    /// Amplitude after smoothing.
+    pub amplitude: f64,
+    /// Part of the stride that the joints allow at this frequency, 0.4..1.
+    pub stride: f64,
+    /// False when the gesture is faster than the joints can follow: the phase runs free.
+    pub locked: bool,
+    /// Travel of the body per second, in its own frame.
+    pub root_velocity: RootAdvance,
+}
+
+impl MotionClass {
+    /// Builds a class from examples for joints with the given ranges.
+    pub fn new(
+        name: &str,
+        examples: Vec<Example>,
+        ranges: Vec<JointRange>,
+    ) -> Result<Self, ClassError> {
+        let parameters: Vec<Parameters> = examples.iter().map(|e| e.parameters).collect();
+        let weights_map = Weights::new(&parameters).map_err(|source| ClassError::Weights {
+            class: name.into(),
+            source,
+        })?;
+        let kind = examples[0].clip.kind;
+        if let Some(odd) = examples.iter().find(|e| e.clip.kind != kind) {
+            return Err(ClassError::MixedKinds {
+                class: name.into(),
+                clip: odd.clip.name.clone(),
+                found: match odd.clip.kind {
+                    ClipKind::Cycle => "cycle",
+                    ClipKind::Path => "path",
+                },
+            });
+        }
+        let joints = examples[0].clip.joints();
+        let clips: Vec<&Clip> = examples.iter().map(|e| &e.clip).collect();
+        let steepness = Steepness::of(&clips);
+        let (limb_of, offsets) = timelines(name, &clips, joints)?;
+        let limbs = offsets.iter().flatten().map(Vec::len).max().unwrap_or(0);
+        let count = examples.len();
+        let frequency = weights_map.frequencies().0;
+        Ok(Self {
+            name: name.into(),
+            examples,
+            kind,
+            weights_map,
+            steepness,
+            ranges,
+            limb_of,
+            offsets,
+            lock_rate: 4.0,
+            state: State {
+                amplitude: Follower::at(0.0),
+                frequency: Follower::at(frequency),
+                phase: 0.0,
+                rate: 0.0,
+                limb_shift: vec![0.0; limbs],
+                locked: true,
+                stride: 1.0,
+            },
+            sampled: vec![0.0; count * joints],
+            weights: vec![0.0; count],
+        })
+    }
+
+    /// Whether the class repeats.
+    pub fn kind(&self) -> ClipKind {
+        self.kind
+    }
+
+    /// Blend weight of every example in the last step.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Names of the examples, in the order of [`MotionClass::weights`].
+    pub fn clip_names(&self) -> impl Iterator<Item = &str> {
+        self.examples.iter().map(|e| e.clip.name.as_str())
+    }
+
+    /// Pose at rest: amplitude or progression zero, into `out`.
+    pub fn rest_pose(&mut self, space: &dyn PoseSpace, out: &mut [f64]) {
+        let (lowest, _) = self.weights_map.frequencies();
+        self.weights_map.at([0.0, lowest], &mut self.weights);
+        self.sample(space, 0.0, out);
+    }
+
+    /// One step of `dt_s` under `drive`; the pose goes into `out`. Allocates nothing.
+    pub fn step(
+        &mut self,
+        space: &dyn PoseSpace,
+        drive: Drive,
+        dt_s: f64,
+        out: &mut [f64],
+    ) -> Played {
+        match self.kind {
+            ClipKind::Cycle => self.step_cycle(space, drive, dt_s, out),
+            ClipKind::Path => self.step_path(space, drive, dt_s, out),
+        }
+    }
+
+    fn step_cycle(
+        &mut self,
+        space: &dyn PoseSpace,
+        drive: Drive,
+        dt_s: f64,
+        out: &mut [f64],
+    ) -> Played {
+        let (lowest_hz, highest_hz) = self.weights_map.frequencies();
+        // A gesture in the opposite sense is another gesture, not this one played backwards.
+        let performed = drive.frequency_hz > 0.0 && drive.amplitude.is_finite();
+        let wanted = if performed {
+            awake(drive.amplitude)
+        } else {
+            0.0
+        };
+        let state = &mut self.state;
+        let amplitude = state
+            .amplitude
+            .step(wanted.min(1.0), 9.0, 2.5, dt_s)
+            .max(0.0);
+        if performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
+            let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
+            state.frequency.step(goal, 12.0, 6.0, dt_s);
+        }
+        let frequency_hz = state.frequency.value;
+        self.weights_map
+            .at([amplitude, frequency_hz], &mut self.weights);
+
+        // Range: shorten the stride first, then hold the highest frequency and give up the lock.
+        let rate = TAU * frequency_hz;
+        let allowed = self
+            .steepness
+            .scale_limit(&self.weights, rate, &self.ranges, RANGE_SHARE);
+        let stride_goal = allowed.clamp(LEAST_STRIDE, 1.0);
+        // Shorten at once, lengthen at leisure: the limit is the joints', the comfort ours.
+        state.stride = if stride_goal < state.stride {
+            stride_goal
+        } else {
+            state.stride + (stride_goal - state.stride) * (dt_s / 0.15).min(1.0)
+        };
+        let highest_rate = if allowed < LEAST_STRIDE {
+            self.steepness
+                .rate_limit(&self.weights, LEAST_STRIDE, &self.ranges, RANGE_SHARE)
+        } else {
+            f64::INFINITY
+        };
+        state.locked = rate <= highest_rate;
+
+        let goal_rate = if state.locked {
+            // Second-order lock: feed-forward of the gesture's frequency, correction of the phase.
+            let lag = wrap_pi(drive.phase_rad - state.phase);
+            let bound = 0.35 * rate;
+            let correction = if wanted > 0.0 && lag.is_finite() {
+                (self.lock_rate * lag).clamp(-bound, bound)
+            } else {
+                0.0
+            };
+            rate + correction
+        } else {
+            highest_rate
+        };
+        let follow = 1.0 - (-dt_s / 0.06).exp();
+        state.rate += (goal_rate - state.rate) * follow;
+        if amplitude < 1e-4 {
+            // Standing still: nobody sees the phase, so it may be right when the first step comes.
+            state.rate = goal_rate;
+            state.phase = drive.phase_rad;
+            if !state.phase.is_finite() {
+                state.phase = 0.0;
+            }
+        }
+        let advance = state.rate * dt_s;
+        state.phase = wrap_tau(state.phase + advance);
+        self.shift_limbs(advance, amplitude < 1e-4);
+
+        let phase = self.state.phase;
+        let stride = self.state.stride;
+        self.sample(space, phase, out);
+        self.shorten(space, stride, out);
+        let mut velocity = RootAdvance::default();
+        let per_second = self.state.rate / TAU * stride;
+        for (example, weight) in self.examples.iter().zip(&self.weights) {
+            velocity.forward_m += weight * example.clip.root.forward_m * per_second;
+            velocity.left_m += weight * example.clip.root.left_m * per_second;
+            velocity.yaw_rad += weight * example.clip.root.yaw_rad * per_second;
+        }
+        Played {
+            phase_rad: phase,
+            frequency_hz: self.state.rate / TAU,
+            amplitude,
+            stride,
+            locked: self.state.locked,
+            root_velocity: velocity,
+        }
+    }
+
+    fn step_path(
+        &mut self,
+        space: &dyn PoseSpace,
+        drive: Drive,
+        dt_s: f64,
+        out: &mut [f64],
+    ) -> Played {
+        let wanted = if drive.amplitude.is_finite() {
+            awake(drive.amplitude).min(1.0)
+        } else {
+            0.0
+        };
+        self.weights_map.at([1.0, 0.0], &mut self.weights);
+        // Steepness is kept per radian of phase; one progression is one turn of it.
+        let fastest = self
+            .steepness
+            .rate_limit(&self.weights, 1.0, &self.ranges, RANGE_SHARE)
+            / TAU;
+        let progression = self
+            .state
+            .amplitude
+            .step(wanted, 9.0_f64.min(2.0 * fastest), fastest.min(1e3), dt_s)
+            .clamp(0.0, 1.0);
+        self.sample(space, progression * TAU, out);
+        Played {
+            phase_rad: progression * TAU,
+            frequency_hz: 0.0,
+            amplitude: progression,
+            stride: 1.0,
+            locked: true,
+            root_velocity: RootAdvance::default(),
+        }
+    }
+
+    /// Moves limb timelines towards the blend of the clips' offsets, at most 5 % of the advance.
+    fn shift_limbs(&mut self, advance: f64, at_rest: bool) {
+        let bound = LIMB_ADVANCE * advance.abs();
+        for limb in 0..self.state.limb_shift.len() {
+            let mut moving = 0.0;
+            let mut sum = 0.0;
+            for (offsets, weight) in self.offsets.iter().zip(&self.weights) {
+                if let Some(offsets) = offsets {
+                    moving += weight;
+                    sum += weight * offsets[limb];
+                }
+            }
+            if moving > 1e-9 {
+                let shift = &mut self.state.limb_shift[limb];
+                let gap = wrap_pi(sum / moving - *shift);
+                *shift += if at_rest {
+                    gap
+                } else {
+                    gap.clamp(-bound, bound)
+                };
+            }
+        }
+    }
+
+    /// Samples every example at its limbs' phases and blends them.
+    fn sample(&mut self, space: &dyn PoseSpace, phase: f64, out: &mut [f64]) {
+        let joints = out.len();
+        for (e, example) in self.examples.iter().enumerate() {
+            if self.weights[e] == 0.0 {
+                continue;
+            }
+            for joint in 0..joints {
+                let shift = match (self.limb_of[joint], &self.offsets[e]) {
+                    (Some(limb), Some(offsets)) => self.state.limb_shift[limb] - offsets[limb],
+                    _ => 0.0,
+                };
+                let u = match self.kind {
+                    ClipKind::Cycle => (phase + shift) / TAU,
+                    ClipKind::Path => phase / TAU,
+                };
+                self.sampled[e * joints + joint] = example.clip.sample(u, joint);
+            }
+        }
+        space.blend(&self.sampled, &self.weights, out);
+    }
+
+    /// Brings the pose towards the example of least amplitude so that `stride` of the way remains.
+    fn shorten(&mut self, space: &dyn PoseSpace, stride: f64, out: &mut [f64]) {
+        if stride >= 1.0 {
+            return;
+        }
+        let joints = out.len();
+        let least = self
+            .examples
+            .iter()
+            .enumerate()
+            .min_by(|(_, a), (_, b)| a.parameters[0].total_cmp(&b.parameters[0]))
+            .map_or(0, |(i, _)| i);
+        // Two rows of the work space serve as a two-pose blend: kept pose, rest pose.
+        if self.examples.len() < 2 {
+            return;
+        }
+        self.sampled[..joints].copy_from_slice(out);
+        for joint in 0..joints {
+            self.sampled[joints + joint] = self.examples[least].clip.sample(0.0, joint);
+        }
+        space.blend(&self.sampled[..2 * joints], &[stride, 1.0 - stride], out);
+    }
+}
+
+/// Amplitude with tremor taken out: zero below 0.04, unchanged from 0.15 on.
+fn awake(amplitude: f64) -> f64 {
+    let u = (amplitude - REST_AMPLITUDE) / (FULL_FROM_AMPLITUDE - REST_AMPLITUDE);
+    amplitude.max(0.0) * super::smooth::ease(u)
+}
+
+/// Limb of each joint, and per clip the offset of every limb's timeline against the reference.
+///
+/// The reference is the slowest moving clip (the longest); offsets are brought into half a turn of it.
+type Timelines = (Vec<Option<usize>>, Vec<Option<Vec<f64>>>);
+
+fn timelines(class: &str, clips: &[&Clip], joints: usize) -> Result<Timelines, ClassError> {
+    let moves = |clip: &Clip| !clip.limbs.is_empty() && clip.limbs.iter().any(|l| l.duty < 1.0);
+    let reference = clips
+        .iter()
+        .filter(|c| moves(c))
+        .min_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    let mut limb_of = vec![None; joints];
+    let Some(reference) = reference else {
+        return Ok((limb_of, vec![None; clips.len()]));
+    };
+    for (i, limb) in reference.limbs.iter().enumerate() {
+        for joint in &limb.joints {
+            limb_of[*joint] = Some(i);
+        }
+    }
+    let offsets = clips
+        .iter()
+        .map(|clip| {
+            if !moves(clip) {
+                return Ok(None);
+            }
+            reference
+                .limbs
+                .iter()
+                .map(|wanted| {
+                    clip.limbs
+                        .iter()
+                        .find(|l| l.name == wanted.name)
+                        .map(|l| wrap_pi(TAU * (wanted.phase - l.phase)))
+                        .ok_or_else(|| ClassError::Limbs {
+                            class: class.into(),
+                            clip: clip.name.clone(),
+                            segment: wanted.name.clone(),
+                        })
+                })
+                .collect::<Result<Vec<f64>, _>>()
+                .map(Some)
+        })
+        .collect::<Result<_, _>>()?;
+    Ok((limb_of, offsets))
+}

@@ -1,0 +1,336 @@
+//! Gait descriptions: from a few numbers and a URDF with legs to joint-space clips.
+//!
+//! A description is TOML, either a gait or a way through poses:
+//!
+//! ```toml
+//! version = 1
+//! name = "trot_long"
+//! gait = "trot"            # walk, trot, pace, bound or stand
+//! frequency_hz = 1.6       # cycles per second that it must be able to play
+//! stride_m = 0.12          # how far the body travels in one cycle
+//! duty_factor = 0.5        # fraction of the cycle a foot is on the ground
+//! step_height_m = 0.025
+//! body_height_m = 0.15     # of the root link above the feet
+//! turn_rad = 0.0           # how far the body turns in one cycle, counter-clockwise
+//! # [phase]                # own touch-down phases, fraction of the cycle, instead of the preset's
+//! # front_left = 0.5
+//! ```
+//!
+//! ```toml
+//! version = 1
+//! name = "bow"
+//! [[pose]]
+//! body_height_m = 0.15
+//! [[pose]]                 # the last pose is progression 1
+//! body_height_m = 0.12
+//! pitch_rad = 0.3          # nose down
+//! forward_m = -0.02
+//! ```
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Presets: touch-down phases per leg.
+#[derive(Copy, Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GaitName {
+    /// Lateral-sequence walk: rear left, front left, rear right, front right, a quarter apart.
+    Walk,
+    /// Diagonal legs together.
+    Trot,
+    /// Legs of one side together.
+    Pace,
+    /// Front legs together, rear legs together.
+    Bound,
+    /// All feet stay on the ground.
+    Stand,
+}
+
+impl GaitName {
+    /// All presets with their names.
+    pub const ALL: [(&'static str, GaitName); 5] = [
+        ("walk", GaitName::Walk),
+        ("trot", GaitName::Trot),
+        ("pace", GaitName::Pace),
+        ("bound", GaitName::Bound),
+        ("stand", GaitName::Stand),
+    ];
+
+    /// The preset called `name`.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map(|(_, gait)| *gait)
+    }
+
+    /// Touch-down phase of a leg, fraction of the cycle. Unknown legs start at zero.
+    pub fn phase(self, leg: &str) -> f64 {
+        let [rear_left, front_left, rear_right, front_right] = match self {
+            GaitName::Walk => [0.0, 0.25, 0.5, 0.75],
+            GaitName::Trot => [0.0, 0.5, 0.5, 0.0],
+            GaitName::Pace => [0.0, 0.0, 0.5, 0.5],
+            GaitName::Bound => [0.0, 0.5, 0.0, 0.5],
+            GaitName::Stand => [0.0; 4],
+        };
+        match leg {
+            "rear_left" => rear_left,
+            "front_left" => front_left,
+            "rear_right" => rear_right,
+            "front_right" => front_right,
+            _ => 0.0,
+        }
+    }
+
+    /// Duty factor when none is given.
+    pub fn duty_factor(self) -> f64 {
+        match self {
+            GaitName::Walk => 0.7,
+            GaitName::Stand => 1.0,
+            _ => 0.5,
+        }
+    }
+}
+
+/// One pose of the body over feet that stay on the ground.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyPose {
+    /// Height of the root link above the feet; that of the description when not given.
+    pub body_height_m: Option<f64>,
+    /// Nose down is positive, rad.
+    #[serde(default)]
+    pub pitch_rad: f64,
+    /// Right side down is positive, rad.
+    #[serde(default)]
+    pub roll_rad: f64,
+    /// Counter-clockwise seen from above, rad.
+    #[serde(default)]
+    pub yaw_rad: f64,
+    /// Body displacement forwards, m.
+    #[serde(default)]
+    pub forward_m: f64,
+    /// Body displacement to the left, m.
+    #[serde(default)]
+    pub left_m: f64,
+}
+
+/// A gait or a way through poses, as an author writes it. Lengths not given follow from the legs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GaitDescription {
+    /// Format version, 1.
+    pub version: u32,
+    /// Name of the clip.
+    pub name: String,
+    /// Where it comes from.
+    #[serde(default)]
+    pub origin: String,
+    /// Preset of touch-down phases; a gait has this or `phase`.
+    pub gait: Option<GaitName>,
+    /// Cycles per second that the gait must be able to play.
+    pub frequency_hz: Option<f64>,
+    /// Body travel per cycle, m; negative is backwards.
+    pub stride_m: Option<f64>,
+    /// Fraction of the cycle a foot is on the ground, 0.1..1.
+    pub duty_factor: Option<f64>,
+    /// Highest foot clearance in swing, m.
+    pub step_height_m: Option<f64>,
+    /// Height of the root link above the feet, m.
+    pub body_height_m: Option<f64>,
+    /// Turn per cycle, rad, counter-clockwise.
+    #[serde(default)]
+    pub turn_rad: f64,
+    /// Touch-down phase per leg, fraction of the cycle.
+    #[serde(default)]
+    pub phase: BTreeMap<String, f64>,
+    /// A way through poses instead of a gait; two or more.
+    #[serde(default)]
+    pub pose: Vec<BodyPose>,
+}
+
+/// Why a description cannot become a clip.
+#[derive(Debug, thiserror::Error)]
+pub enum GaitError {
+    /// Not a description.
+    #[error("not a gait description: {0}")]
+    Toml(#[from] toml::de::Error),
+    /// A value is missing or out of range.
+    #[error("{key}: {problem}")]
+    Value {
+        /// Key of the description.
+        key: &'static str,
+        /// What was found and what is allowed.
+        problem: String,
+    },
+    /// The legs cannot do it.
+    #[error(
+        "{name}: {source}. Try a smaller stride_m or step_height_m, or another body_height_m ({body_height_m:.3} m now, legs are {leg_length_m:.3} m long)"
+    )]
+    Leg {
+        /// Clip name.
+        name: String,
+        /// Which foot, and where.
+        source: crate::robot::leg::LegError,
+        /// Body height tried, m.
+        body_height_m: f64,
+        /// Length of the leg, m.
+        leg_length_m: f64,
+    },
+    /// The joints are too slow even for a much shorter stride.
+    #[error(
+        "{name}: joint {joint} allows at most {max_hz:.2} Hz, {frequency_hz:.2} Hz is asked for, and shortening the stride to {least_percent:.0} % does not help. Lower frequency_hz or step_height_m"
+    )]
+    TooFast {
+        /// Clip name.
+        name: String,
+        /// The joint that is in the way.
+        joint: String,
+        /// Highest frequency at the shortest stride, Hz.
+        max_hz: f64,
+        /// Asked for, Hz.
+        frequency_hz: f64,
+        /// Shortest stride tried, percent.
+        least_percent: f64,
+    },
+}
+
+impl GaitDescription {
+    /// Parses and checks the TOML text of a description.
+    pub fn from_toml(text: &str) -> Result<Self, GaitError> {
+        let description: GaitDescription = toml::from_str(text)?;
+        description.check()?;
+        Ok(description)
+    }
+
+    /// A preset with everything else left to the legs.
+    pub fn preset(name: &str, gait: GaitName) -> Self {
+        Self {
+            version: 1,
+            name: name.into(),
+            origin: String::new(),
+            gait: Some(gait),
+            frequency_hz: None,
+            stride_m: None,
+            duty_factor: None,
+            step_height_m: None,
+            body_height_m: None,
+            turn_rad: 0.0,
+            phase: BTreeMap::new(),
+            pose: Vec::new(),
+        }
+    }
+
+    /// Checks ranges; called again after values were overridden.
+    pub fn check(&self) -> Result<(), GaitError> {
+        let bad = |key, problem: String| Err(GaitError::Value { key, problem });
+        if self.version != 1 {
+            return bad(
+                "version",
+                format!("{} is not known; this build reads 1", self.version),
+            );
+        }
+        let is_gait = self.gait.is_some() || !self.phase.is_empty();
+        if is_gait != self.pose.is_empty() {
+            return bad(
+                "gait",
+                "give either gait (or [phase]) for a cycle, or two or more [[pose]] for a path"
+                    .into(),
+            );
+        }
+        if !self.pose.is_empty() && self.pose.len() < 2 {
+            return bad("pose", "a path needs two or more [[pose]] tables".into());
+        }
+        let positive = [
+            ("frequency_hz", self.frequency_hz, 20.0),
+            ("body_height_m", self.body_height_m, 5.0),
+            ("duty_factor", self.duty_factor, 1.0),
+        ];
+        for (key, value, highest) in positive {
+            if let Some(v) = value
+                && !(v > 0.0 && v <= highest)
+            {
+                return bad(key, format!("{v} is not in 0..{highest} (above 0)"));
+            }
+        }
+        if let Some(d) = self.duty_factor
+            && d < 0.1
+        {
+            return bad(
+                "duty_factor",
+                format!("{d} is below 0.1: the foot would hardly touch the ground"),
+            );
+        }
+        if let Some(h) = self.step_height_m
+            && !(0.0..=1.0).contains(&h)
+        {
+            return bad("step_height_m", format!("{h} is not in 0..1 m"));
+        }
+        if let Some(s) = self.stride_m
+            && !(-5.0..=5.0).contains(&s)
+        {
+            return bad("stride_m", format!("{s} is not in -5..5 m"));
+        }
+        if !(-3.2..=3.2).contains(&self.turn_rad) {
+            return bad("turn_rad", format!("{} is not in -3.2..3.2", self.turn_rad));
+        }
+        for (leg, phase) in &self.phase {
+            if !(0.0..1.0).contains(phase) {
+                return bad("phase", format!("{leg} = {phase} is not in 0..1"));
+            }
+        }
+        for pose in &self.pose {
+            let angles = [pose.pitch_rad, pose.roll_rad, pose.yaw_rad];
+            if !angles.iter().all(|a| (-1.2..=1.2).contains(a)) {
+                return bad(
+                    "pose",
+                    format!("angles {angles:?} must lie in -1.2..1.2 rad"),
+                );
+            }
+            if let Some(h) = pose.body_height_m
+                && !(h > 0.0 && h <= 5.0)
+            {
+                return bad(
+                    "pose",
+                    format!("body_height_m = {h} is not in 0..5 (above 0)"),
+                );
+            }
+            if !(pose.forward_m.abs() <= 2.0 && pose.left_m.abs() <= 2.0) {
+                return bad("pose", "forward_m and left_m must lie in -2..2".into());
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_descriptions_name_the_key() {
+        for (text, expected) in [
+            ("version = 1\nname='x'\ngait='trot'\nstride=1", "stride"),
+            ("version = 1\nname='x'\ngait='gallopp'", "gallopp"),
+            ("version = 2\nname='x'\ngait='trot'", "version"),
+            ("version = 1\nname='x'", "gait"),
+            (
+                "version = 1\nname='x'\ngait='trot'\nduty_factor=1.5",
+                "duty_factor",
+            ),
+            (
+                "version = 1\nname='x'\ngait='trot'\nfrequency_hz=nan",
+                "frequency_hz",
+            ),
+            (
+                "version = 1\nname='x'\n[[pose]]\npitch_rad=0.1",
+                "two or more",
+            ),
+        ] {
+            let message = GaitDescription::from_toml(text)
+                .expect_err("wrong on purpose")
+                .to_string();
+            assert!(message.contains(expected), "{text:?}: {message}");
+        }
+    }
+}
