@@ -1,6 +1,8 @@
 //! The command line: one file per command, exit codes, messages.
 
 mod failure;
+pub mod gesture;
+pub mod poses;
 
 pub use failure::{ExitStatus, Failure};
 
@@ -16,14 +18,20 @@ struct Cli {
 }
 
 #[derive(Subcommand, Debug)]
-enum Command {}
+enum Command {
+    /// Record gestures from one example, estimate their waves, check them.
+    Gesture(gesture::GestureArgs),
+    /// Pose streams: import, info, compose.
+    Poses(poses::PosesArgs),
+}
 
 /// Parses the command line, runs the command, prints its failure and returns its exit code.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome: Result<ExitStatus, Failure> = match cli.command {
         None => Ok(ExitStatus::Done),
-        Some(command) => match command {},
+        Some(Command::Gesture(args)) => gesture::run(args),
+        Some(Command::Poses(args)) => poses::run(args),
     };
     match outcome {
         Ok(status) => status.into(),

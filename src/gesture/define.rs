@@ -10,7 +10,7 @@ const PERIODIC: f64 = 0.5;
 /// periods.
 const STRETCH_S: f64 = 20.0;
 /// Half width of the stretch that is compared when looking for the end, in periods.
-const COMPARED: f64 = 0.1;
+const COMPARED: f64 = 0.15;
 /// A gesture needs this many frames.
 const FEWEST_FRAMES: usize = 4;
 /// The periods the estimators can follow, in seconds.
@@ -308,7 +308,14 @@ pub fn define_cyclic(
                     });
                 }
             };
-            (end_of_period(&uniform, step, period), Some(periodicity))
+            // With what precedes the mark, as far as it is compared.
+            let before = nearest(recording, t0 - COMPARED * period).min(start);
+            let around = resampled(recording, &local, before, step);
+            let first = ((t0 - times[before]) / step).round() as usize;
+            (
+                end_of_period(&around, first, step, period),
+                Some(periodicity),
+            )
         }
     };
     if !(PERIODS_S.0 * 0.97..=PERIODS_S.1 * 1.03).contains(&duration_s) {
@@ -348,18 +355,19 @@ pub fn define_cyclic(
     })
 }
 
-/// Time after the start at which the surroundings of the start come back.
-fn end_of_period(uniform: &[Vec<f64>], step: f64, period: f64) -> f64 {
+/// Time after row `first` at which the surroundings of that row come back.
+fn end_of_period(rows: &[Vec<f64>], first: usize, step: f64, period: f64) -> f64 {
     let half = (COMPARED * period / step) as usize;
     let low = (2.0 / 3.0 * period / step).ceil() as usize;
-    let high = ((4.0 / 3.0 * period / step) as usize).min(uniform.len() - 1);
-    // The start is the first row, so only what follows it can be compared.
+    let high = ((4.0 / 3.0 * period / step) as usize).min(rows.len().saturating_sub(first + 1));
     let score = |lag: usize| -> f64 {
-        let pairs = half.min(uniform.len() - 1 - lag);
-        (0..=pairs)
-            .map(|k| distance(&uniform[k], &uniform[lag + k]))
+        let last = (first + half).min(rows.len() - 1 - lag);
+        let stretch = first.saturating_sub(half)..=last;
+        let pairs = stretch.clone().count().max(1) as f64;
+        stretch
+            .map(|k| distance(&rows[k], &rows[k + lag]))
             .sum::<f64>()
-            / (pairs + 1) as f64
+            / pairs
     };
     let best = (low..=high).min_by(|a, b| score(*a).total_cmp(&score(*b)));
     let Some(best) = best else {

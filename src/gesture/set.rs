@@ -131,7 +131,14 @@ impl GestureSet {
     }
 
     /// Adds a gesture, or replaces the one of the same name; true when it replaced one.
+    ///
+    /// All gestures share one reference frame; a set without one takes the gesture's first frame.
     pub fn put(&mut self, gesture: Gesture) -> bool {
+        if self.reference.is_empty()
+            && let Some(first) = gesture.frames.first()
+        {
+            self.reference.clone_from(first);
+        }
         match self.gestures.iter_mut().find(|g| g.name == gesture.name) {
             Some(old) => {
                 *old = gesture;

@@ -4,7 +4,7 @@
 //! [`Validator`] decides whether that sample may pass. [`PoseReader`] ties the three together for
 //! files and pipes, a network source does the same with its datagrams.
 
-//pub mod compose;
+pub mod compose;
 pub mod csv;
 mod error;
 pub mod global;
