@@ -1,7 +1,9 @@
 //! The command line: one file per command, exit codes, messages.
 
-mod clip;
+pub mod clip;
 mod failure;
+pub mod gesture;
+pub mod poses;
 
 pub use failure::{ExitStatus, Failure};
 
@@ -18,6 +20,10 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// Record gestures from one example, estimate their waves, check them
+    Gesture(gesture::GestureArgs),
+    /// Pose streams: import, info, compose
+    Poses(poses::PosesArgs),
     /// Bring motion in; author gaits for a legged robot
     Clip(clip::ClipArgs),
 }
@@ -27,9 +33,9 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome: Result<ExitStatus, Failure> = match cli.command {
         None => Ok(ExitStatus::Done),
-        Some(command) => match command {
-            Command::Clip(args) => clip::run(&args),
-        },
+        Some(Command::Gesture(args)) => gesture::run(args),
+        Some(Command::Poses(args)) => poses::run(args),
+        Some(Command::Clip(args)) => clip::run(&args),
     };
     match outcome {
         Ok(status) => status.into(),

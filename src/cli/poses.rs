@@ -1,0 +1,218 @@
+//! `handwave poses`: bring recordings into the pose stream, look at them, compose performances.
+
+use super::{ExitStatus, Failure};
+use crate::pose::{FaultCounts, PoseError, Recording, compose, leap};
+use clap::{Args, Subcommand};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Pose streams: import, info, compose.
+#[derive(Args, Debug)]
+pub struct PosesArgs {
+    #[command(subcommand)]
+    command: PosesCommand,
+}
+
+#[derive(Subcommand, Debug)]
+enum PosesCommand {
+    /// Bring another program's recording into the pose stream.
+    #[command(after_help = "Examples:
+  handwave poses import waiting.json --out waiting.csv           a Leap Motion recording
+  handwave poses import waiting.json --joints --out hand.jsonl   with the knuckles
+
+Known: Leap Motion (LeapJS playback, decompressed JSON; millimetres and microseconds).")]
+    Import {
+        /// The recording.
+        file: PathBuf,
+        /// Where to write it: .jsonl or .csv, metres and seconds from 0.
+        #[arg(long)]
+        out: PathBuf,
+        /// With the joints of every finger (mcp, pip, dip), where the recording has them.
+        #[arg(long)]
+        joints: bool,
+    },
+    /// What is in a pose stream: points, length, rate, gaps, dropped samples.
+    #[command(after_help = "Examples:
+  handwave poses info waiting.csv
+  handwave poses info waiting.csv --json")]
+    Info {
+        /// The pose stream (.jsonl or .csv).
+        file: PathBuf,
+        /// One JSON object instead of text.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Compose a performance from recordings, by a recipe.
+    #[command(after_help = "Examples:
+  handwave poses compose drum_and_splay.toml --out drum_and_splay.jsonl
+
+A recipe (TOML) names its sources and lists segments:
+  handwave = \"recipe\"
+  version = 1
+  seed = 1
+  [sources]
+  waiting = \"waiting.csv\"
+  [[segment]]
+  kind = \"loop\"          # hold, loop or cut
+  source = \"waiting\"
+  from = 0.5
+  to = 1.6
+  crossfade_s = 0.1
+  speed = 0.8
+  size = 0.7
+  duration_s = 8.0
+  join_s = 0.5")]
+    Compose {
+        /// The recipe.
+        recipe: PathBuf,
+        /// Where to write the performance: .jsonl or .csv.
+        #[arg(long)]
+        out: PathBuf,
+    },
+}
+
+/// Runs `handwave poses`.
+///
+/// # Errors
+/// Bad input, with exit code 2.
+pub fn run(args: PosesArgs) -> Result<ExitStatus, Failure> {
+    match args.command {
+        PosesCommand::Import { file, out, joints } => import(&file, &out, joints),
+        PosesCommand::Info { file, json } => info(&file, json),
+        PosesCommand::Compose { recipe, out } => {
+            write(&compose::compose(&recipe).map_err(Failure::input)?, &out)
+        }
+    }
+}
+
+fn import(file: &Path, out: &Path, joints: bool) -> Result<ExitStatus, Failure> {
+    write(&leap::import(file, joints).map_err(Failure::input)?, out)
+}
+
+fn write(recording: &Recording, out: &Path) -> Result<ExitStatus, Failure> {
+    recording.write(out).map_err(Failure::input)?;
+    let (from, to) = recording.span_s();
+    println!(
+        "{}: {} samples, {} points, {:.3} s",
+        out.display(),
+        recording.samples.len(),
+        recording.header.points.len(),
+        to - from
+    );
+    Ok(ExitStatus::Done)
+}
+
+/// Reads a recording and says on standard error what was dropped.
+pub(super) fn read(path: &Path) -> Result<(Recording, FaultCounts), Failure> {
+    let (recording, dropped) =
+        Recording::read(path).map_err(|error: PoseError| Failure::input(error))?;
+    if dropped.total() > 0 {
+        eprintln!("{}: dropped samples: {dropped}", path.display());
+    }
+    Ok((recording, dropped))
+}
+
+fn info(file: &Path, json: bool) -> Result<ExitStatus, Failure> {
+    let (recording, dropped) = read(file)?;
+    let (from, to) = recording.span_s();
+    let mut steps: Vec<f64> = recording
+        .samples
+        .windows(2)
+        .map(|pair| pair[1].t - pair[0].t)
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    let step = |share: f64| -> f64 {
+        let index = (share * steps.len().saturating_sub(1) as f64) as usize;
+        1e3 * steps.get(index).copied().unwrap_or(0.0)
+    };
+    let rate = if to > from {
+        steps.len() as f64 / (to - from)
+    } else {
+        0.0
+    };
+    let points: Vec<PointInfo> = (0..recording.header.points.len())
+        .map(|index| PointInfo::of(&recording, index))
+        .collect();
+    if json {
+        let object = serde_json::json!({
+            "file": file.display().to_string(),
+            "samples": recording.samples.len(),
+            "dim": recording.header.dim,
+            "from_s": from, "to_s": to, "rate_hz": rate,
+            "step_ms": {"min": step(0.0), "median": step(0.5), "max": step(1.0)},
+            "points": points.iter().map(PointInfo::json).collect::<Vec<_>>(),
+            "channels": recording.header.channels,
+            "dropped": dropped.by_reason().into_iter().collect::<BTreeMap<_, _>>(),
+        });
+        println!("{object}");
+        return Ok(ExitStatus::Done);
+    }
+    println!(
+        "{}: {} samples, {}-D, {from:.3} to {to:.3} s, {rate:.1} Hz (steps {:.1} / {:.1} / {:.1} ms min / median / max)",
+        file.display(),
+        recording.samples.len(),
+        recording.header.dim,
+        step(0.0),
+        step(0.5),
+        step(1.0)
+    );
+    println!("dropped: {dropped}");
+    println!(
+        "{:<20} {:>6}  {:>26}  {:>20}",
+        "point", "seen", "mean x y z [mm]", "range x y z [mm]"
+    );
+    for point in &points {
+        let [x, y, z] = point.mean.map(|v| 1e3 * v);
+        let [dx, dy, dz] = point.range.map(|v| 1e3 * v);
+        println!(
+            "{:<20} {:>5.1}%  {x:>8.1} {y:>8.1} {z:>8.1}  {dx:>6.1} {dy:>6.1} {dz:>6.1}",
+            point.name,
+            100.0 * point.seen
+        );
+    }
+    if !recording.header.channels.is_empty() {
+        println!("channels: {}", recording.header.channels.join(", "));
+    }
+    Ok(ExitStatus::Done)
+}
+
+struct PointInfo {
+    name: String,
+    seen: f64,
+    mean: [f64; 3],
+    range: [f64; 3],
+}
+
+impl PointInfo {
+    fn of(recording: &Recording, index: usize) -> Self {
+        let places = || {
+            recording
+                .samples
+                .iter()
+                .filter_map(move |sample| sample.points[index])
+        };
+        let count = places().count();
+        let mut mean = [0.0; 3];
+        let mut range = [0.0; 3];
+        if count > 0 {
+            for axis in 0..3 {
+                mean[axis] = places().map(|p| p[axis]).sum::<f64>() / count as f64;
+                let low = places().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
+                let high = places().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
+                range[axis] = high - low;
+            }
+        }
+        Self {
+            name: recording.header.points[index].clone(),
+            seen: count as f64 / recording.samples.len().max(1) as f64,
+            mean,
+            range,
+        }
+    }
+
+    fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "name": self.name, "seen": self.seen, "mean_m": self.mean, "range_m": self.range,
+        })
+    }
+}

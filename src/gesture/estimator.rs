@@ -1,0 +1,67 @@
+//! What every wave estimator offers: points of a plane in, amplitude, frequency and phase out.
+
+use super::{GaborEstimator, GestureOptions};
+
+/// One pose on a gesture's plane.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct PlanePoint {
+    /// Place on the plane; the reference runs on the unit circle, counter-clockwise.
+    pub z: [f64; 2],
+    /// How little the pose tells about each component (average pairwise distance of the targets of
+    /// the nearest reference frames); `[1, 1]` when nothing is known.
+    pub variance: [f64; 2],
+}
+
+/// Amplitude, frequency and phase of one cyclic gesture.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct WaveEstimate {
+    /// 0 = not performed, 1 = as large as the reference; not clamped.
+    pub amplitude: f64,
+    /// Cycles per second; negative when performed in the opposite sense.
+    pub frequency_hz: f64,
+    /// Position in the cycle, [0, 2 pi); zero at the reference's frame farthest from its mean.
+    pub phase_rad: f64,
+    /// How much of the motion on the plane is that wave, 0..1.
+    pub quality: f64,
+}
+
+/// Estimates a wave from points on a plane, one at a time.
+///
+/// `push` and `estimate` allocate nothing. Times are seconds and strictly increase; the caller has
+/// checked that all numbers are finite.
+pub trait Estimator: Send {
+    /// Takes the next point.
+    fn push(&mut self, t: f64, point: PlanePoint);
+    /// The estimate at the time of the last point; all zero before the first.
+    fn estimate(&self) -> WaveEstimate;
+    /// Forgets everything.
+    fn reset(&mut self);
+}
+
+/// The estimators one can choose.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum EstimatorKind {
+    /// The thesis's bank of one-sided Gabor filters (Rhodin 2016, section 9.4.2).
+    #[default]
+    Gabor,
+}
+
+impl EstimatorKind {
+    /// Names that [`EstimatorKind::from_name`] knows.
+    pub const NAMES: [&'static str; 2] = ["default", "gabor"];
+
+    /// The estimator of that name; `default` is the best one there is.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "default" | "gabor" => Some(Self::Gabor),
+            _ => None,
+        }
+    }
+
+    /// A new estimator of this kind.
+    pub fn build(self, options: &GestureOptions) -> Box<dyn Estimator> {
+        match self {
+            Self::Gabor => Box::new(GaborEstimator::new(options)),
+        }
+    }
+}

@@ -1,0 +1,295 @@
+//! The linear map from a pose to a gesture's plane (Rhodin 2016, section 9.4.1, eq. 9.1 and 9.2).
+
+use super::{GestureKind, GestureSet, PlanePoint};
+use crate::pose::GlobalFit;
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
+
+/// Frames, even in phase, to which a reference is brought for the nearest-neighbour test.
+const NEIGHBOUR_FRAMES: usize = 64;
+/// Nearest frames that are asked (the thesis's n).
+const NEIGHBOURS: usize = 10;
+/// Weight of every gesture's frames together in the regression, so that neither the tracker's rate
+/// nor a gesture's length decides how much it counts.
+const BLOCK_WEIGHT: f64 = 100.0;
+/// Weight of the gesture's own mean pose, a rest pose where amplitude is zero.
+const REST_WEIGHT: f64 = 25.0;
+/// A component that explains less than this of its target is left as the regression gives it.
+const EXPLAINED: f64 = 0.5;
+
+/// The reference frames of a set without their global motion, ready for training.
+#[derive(Clone, Debug)]
+pub struct References {
+    /// Removes global motion, of references and live poses alike.
+    pub fit: GlobalFit,
+    /// Per gesture one flat row (x, y, z per point) per frame, metres.
+    pub local: Vec<Vec<DVector<f64>>>,
+    /// Per gesture its mean pose over time.
+    pub mean: Vec<DVector<f64>>,
+    /// Root mean square distance of a frame from its gesture's mean, over all gestures, metres:
+    /// divides poses so that one regularisation serves every tracker.
+    pub scale_m: f64,
+}
+
+impl References {
+    /// Removes the global motion of all frames of `set`.
+    ///
+    /// # Errors
+    /// The name of an anchor that the set does not have.
+    pub fn new(set: &GestureSet) -> Result<Self, String> {
+        let mut fit = GlobalFit::new(&set.header, &set.reference, &set.global)?;
+        let frames = || set.gestures.iter().flat_map(|gesture| &gesture.frames);
+        fit.weigh(frames().map(Vec::as_slice));
+        let mut out = vec![[0.0; 3]; set.header.points.len()];
+        let mut flat = |frame: &Vec<[f64; 3]>| {
+            fit.remove(frame, None, &mut out);
+            DVector::from_iterator(out.len() * 3, out.iter().flatten().copied())
+        };
+        let local: Vec<Vec<DVector<f64>>> = set
+            .gestures
+            .iter()
+            .map(|gesture| gesture.frames.iter().map(&mut flat).collect())
+            .collect();
+        let mean: Vec<DVector<f64>> = local
+            .iter()
+            .map(|rows| {
+                rows.iter().fold(
+                    DVector::zeros(set.header.points.len() * 3),
+                    |sum: DVector<f64>, row| sum + row,
+                ) / rows.len().max(1) as f64
+            })
+            .collect();
+        let (mut square, mut count) = (0.0, 0.0);
+        for (rows, mean) in local.iter().zip(&mean) {
+            for row in rows {
+                square += (row - mean).norm_squared() / rows.len() as f64;
+            }
+            count += 1.0;
+        }
+        let scale_m = if square > 0.0 {
+            (square / count).sqrt()
+        } else {
+            1.0
+        };
+        Ok(Self {
+            fit,
+            local,
+            mean,
+            scale_m,
+        })
+    }
+}
+
+/// Target of frame `k` on the gesture's plane before the phase is shifted.
+fn targets(set: &GestureSet, references: &References, index: usize) -> Vec<[f64; 2]> {
+    let gesture = &set.gestures[index];
+    let duration = gesture.duration_s.max(1e-9);
+    if gesture.kind == GestureKind::NonCyclic {
+        return gesture
+            .times_s
+            .iter()
+            .map(|t| [t / duration, 0.0])
+            .collect();
+    }
+    // Phase zero is at the frame farthest from the mean pose.
+    let far = (0..references.local[index].len())
+        .max_by(|a, b| {
+            let distance =
+                |k: usize| (&references.local[index][k] - &references.mean[index]).norm();
+            distance(*a).total_cmp(&distance(*b))
+        })
+        .unwrap_or(0);
+    let origin = gesture.times_s.get(far).copied().unwrap_or(0.0);
+    gesture
+        .times_s
+        .iter()
+        .map(|t| {
+            let (sin, cos) = (TAU * (t - origin) / duration).sin_cos();
+            [cos, sin]
+        })
+        .collect()
+}
+
+/// The frames of a cyclic gesture brought to even steps of phase, relative to the mean, with their
+/// targets: ten neighbours then are the same share of a period whatever the tracker's rate.
+fn evenly(
+    set: &GestureSet,
+    references: &References,
+    index: usize,
+    own: &[[f64; 2]],
+) -> Vec<(DVector<f64>, [f64; 2])> {
+    let gesture = &set.gestures[index];
+    let (times, rows) = (&gesture.times_s, &references.local[index]);
+    let Some(first) = own.first().filter(|_| rows.len() == times.len()) else {
+        return Vec::new();
+    };
+    let origin = first[1].atan2(first[0]);
+    (0..NEIGHBOUR_FRAMES)
+        .map(|k| {
+            let t = gesture.duration_s * k as f64 / NEIGHBOUR_FRAMES as f64;
+            let before = times.partition_point(|time| *time <= t).max(1) - 1;
+            // After the last frame the first comes again.
+            let (after, end) = match times.get(before + 1) {
+                Some(time) => (before + 1, *time),
+                None => (0, gesture.duration_s),
+            };
+            let span = (end - times[before]).max(1e-9);
+            let u = ((t - times[before]) / span).clamp(0.0, 1.0);
+            let pose = &rows[before] * (1.0 - u) + &rows[after] * u - &references.mean[index];
+            let (sin, cos) = (origin + TAU * t / gesture.duration_s).sin_cos();
+            (pose, [cos, sin])
+        })
+        .collect()
+}
+
+/// One gesture's map from a pose (without global motion) to its plane.
+#[derive(Clone, Debug)]
+pub struct Plane {
+    kind: GestureKind,
+    /// One row per component, each as long as a flat pose.
+    rows: [DVector<f64>; 2],
+    bias: [f64; 2],
+    /// Reference frames relative to their mean, for the nearest-neighbour test.
+    neighbours: Vec<(DVector<f64>, [f64; 2])>,
+    mean: DVector<f64>,
+}
+
+impl Plane {
+    /// Trains the map of gesture `index`: its frames run once round the unit circle (or from 0 to 1),
+    /// all frames of the other gestures and the mean pose map to zero.
+    ///
+    /// Ridge regression with a bias; normal equations or their dual, whichever is smaller. A last
+    /// step divides each component by the share the regression explains, so that the reference
+    /// itself measures amplitude 1; a non-cyclic map is brought to exactly 0 and 1 at its marks.
+    pub fn train(set: &GestureSet, references: &References, index: usize) -> Self {
+        let gesture = &set.gestures[index];
+        let own = targets(set, references, index);
+        let mean = &references.mean[index];
+        let dim = mean.len();
+        let mut inputs: Vec<(DVector<f64>, [f64; 2], f64)> = Vec::new();
+        for (other, rows) in references.local.iter().enumerate() {
+            let weight = BLOCK_WEIGHT / rows.len().max(1) as f64;
+            for (k, row) in rows.iter().enumerate() {
+                let target = if other == index { own[k] } else { [0.0; 2] };
+                inputs.push((row.clone(), target, weight));
+            }
+        }
+        if gesture.kind == GestureKind::Cyclic {
+            inputs.push((mean.clone(), [0.0; 2], REST_WEIGHT));
+        }
+        let n = inputs.len();
+        // Rows of x and z times the root of their weight.
+        let mut x = DMatrix::zeros(n, dim + 1);
+        let mut z = DMatrix::zeros(n, 2);
+        for (k, (pose, target, weight)) in inputs.iter().enumerate() {
+            let root = weight.sqrt();
+            for axis in 0..dim {
+                x[(k, axis)] = root * (pose[axis] - mean[axis]) / references.scale_m;
+            }
+            x[(k, dim)] = root;
+            z[(k, 0)] = root * target[0];
+            z[(k, 1)] = root * target[1];
+        }
+        let ridge = set.options.ridge;
+        let solution = if dim < n {
+            let normal = x.transpose() * &x + DMatrix::identity(dim + 1, dim + 1) * ridge;
+            normal.cholesky().map(|c| c.solve(&(x.transpose() * &z)))
+        } else {
+            let dual = &x * x.transpose() + DMatrix::identity(n, n) * ridge;
+            dual.cholesky().map(|c| x.transpose() * c.solve(&z))
+        }
+        // With ridge > 0 and finite input both matrices are positive definite.
+        .unwrap_or_else(|| DMatrix::zeros(dim + 1, 2));
+        let mut plane = Self {
+            kind: gesture.kind,
+            rows: [0, 1].map(|c| {
+                DVector::from_iterator(dim, (0..dim).map(|a| solution[(a, c)] / references.scale_m))
+            }),
+            bias: [0, 1].map(|c| solution[(dim, c)]),
+            neighbours: Vec::new(),
+            mean: mean.clone(),
+        };
+        plane.calibrate(&references.local[index], &own);
+        if gesture.kind == GestureKind::Cyclic {
+            plane.neighbours = evenly(set, references, index, &own);
+        }
+        plane
+    }
+
+    fn calibrate(&mut self, rows: &[DVector<f64>], own: &[[f64; 2]]) {
+        let place = |plane: &Self, row: &DVector<f64>| plane.linear(row.as_slice());
+        if self.kind == GestureKind::NonCyclic {
+            let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
+                return;
+            };
+            let (rest, extreme) = (place(self, first)[0], place(self, last)[0]);
+            if extreme - rest > EXPLAINED {
+                let gain = 1.0 / (extreme - rest);
+                self.rows[0] *= gain;
+                self.bias[0] = (self.bias[0] - rest) * gain;
+            }
+            return;
+        }
+        for component in 0..2 {
+            let (mut product, mut square) = (0.0, 0.0);
+            for (row, target) in rows.iter().zip(own) {
+                product += place(self, row)[component] * target[component];
+                square += target[component] * target[component];
+            }
+            let explained = if square > 0.0 { product / square } else { 0.0 };
+            if explained > EXPLAINED {
+                self.rows[component] /= explained;
+                self.bias[component] /= explained;
+            }
+        }
+    }
+
+    fn linear(&self, pose: &[f64]) -> [f64; 2] {
+        let mut z = self.bias;
+        for (axis, value) in pose.iter().enumerate().take(self.mean.len()) {
+            let value = value - self.mean[axis];
+            z[0] += self.rows[0][axis] * value;
+            z[1] += self.rows[1][axis] * value;
+        }
+        z
+    }
+
+    /// The place of a flat pose (x, y, z per point, metres, without global motion) on the plane.
+    ///
+    /// Allocates nothing. The variance per component is the mean squared distance between the
+    /// targets of the ten nearest reference frames ("Under-constrained input").
+    pub fn apply(&self, pose: &[f64], with_variance: bool) -> PlanePoint {
+        let z = self.linear(pose);
+        let mut point = PlanePoint {
+            z,
+            variance: [1.0, 1.0],
+        };
+        if !with_variance || self.neighbours.len() <= NEIGHBOURS {
+            return point;
+        }
+        let mut nearest = [(f64::INFINITY, [0.0; 2]); NEIGHBOURS];
+        for (frame, target) in &self.neighbours {
+            let mut distance = 0.0;
+            for (axis, value) in pose.iter().enumerate().take(self.mean.len()) {
+                let d = value - self.mean[axis] - frame[axis];
+                distance += d * d;
+            }
+            if distance < nearest[NEIGHBOURS - 1].0 {
+                let at = nearest.partition_point(|(other, _)| *other <= distance);
+                nearest[at..].rotate_right(1);
+                nearest[at] = (distance, *target);
+            }
+        }
+        for component in 0..2 {
+            let (mut sum, mut square) = (0.0, 0.0);
+            for (_, target) in &nearest {
+                sum += target[component];
+                square += target[component] * target[component];
+            }
+            let n = NEIGHBOURS as f64;
+            // The mean squared distance over all pairs is 2 n / (n - 1) times the variance.
+            point.variance[component] = (2.0 * (square - sum * sum / n) / (n - 1.0)).max(1e-6);
+        }
+        point
+    }
+}

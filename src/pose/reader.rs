@@ -1,0 +1,254 @@
+//! A pose stream read one sample at a time, from a file or anything that yields lines.
+
+use super::json::{self, JsonHeader};
+use super::{FaultCounts, MAX_LINE_BYTES, PoseError, PoseHeader, PoseSample};
+use super::{SampleFault, Validator, csv};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// How the samples are written.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum PoseFormat {
+    /// One JSON object a line ([`json`]).
+    JsonLines,
+    /// A table with a header row ([`csv`]).
+    Csv,
+}
+
+impl PoseFormat {
+    /// The format a file name ends in.
+    ///
+    /// # Errors
+    /// Neither `.jsonl` nor `.csv`.
+    pub fn of(path: &Path) -> Result<Self, PoseError> {
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some("jsonl") => Ok(Self::JsonLines),
+            Some("csv") => Ok(Self::Csv),
+            _ => Err(PoseError::Format {
+                file: path.display().to_string(),
+            }),
+        }
+    }
+}
+
+/// Reads a pose stream: the header at once, then one good sample per call.
+///
+/// Bad samples are dropped and counted ([`PoseReader::counts`]); ten in a row are an error that
+/// names the first. As an iterator it ends after the first error.
+#[derive(Debug)]
+pub struct PoseReader<R> {
+    input: R,
+    file: String,
+    format: PoseFormat,
+    stream: JsonHeader,
+    validator: Validator,
+    line: u64,
+    bytes: Vec<u8>,
+    done: bool,
+}
+
+impl PoseReader<BufReader<File>> {
+    /// Opens a `.jsonl` or `.csv` file and reads its header.
+    ///
+    /// # Errors
+    /// Unknown ending, unreadable file, bad header.
+    pub fn open(path: &Path) -> Result<Self, PoseError> {
+        let file = path.display().to_string();
+        let format = PoseFormat::of(path)?;
+        match File::open(path) {
+            Ok(input) => Self::new(BufReader::new(input), format, &file),
+            Err(source) => Err(PoseError::Read { file, source }),
+        }
+    }
+}
+
+impl<R: BufRead> PoseReader<R> {
+    /// Reads the header from `input`; `file` is the name used in messages.
+    ///
+    /// # Errors
+    /// Unreadable input, bad header.
+    pub fn new(input: R, format: PoseFormat, file: &str) -> Result<Self, PoseError> {
+        let mut reader = Self {
+            input,
+            file: file.into(),
+            format,
+            stream: JsonHeader {
+                header: PoseHeader {
+                    points: Vec::new(),
+                    dim: 3,
+                    channels: Vec::new(),
+                },
+                metres_per_unit: 1.0,
+            },
+            validator: Validator::new(0),
+            line: 0,
+            bytes: Vec::new(),
+            done: false,
+        };
+        let header = |reader: &Self, fault: json::HeaderFault| PoseError::Header {
+            file: reader.file.clone(),
+            line: reader.line.max(1),
+            found: fault.found,
+            allowed: fault.allowed,
+        };
+        let missing = |found: &str| {
+            json::HeaderFault {
+            found: found.into(),
+            allowed: "a header line of a pose stream; other recordings come in with `handwave poses import`".into(),
+        }
+        };
+        let line = match reader.next_line()? {
+            None => return Err(header(&reader, missing("an empty file"))),
+            Some(Err(_)) => {
+                return Err(header(&reader, missing("a line over 64 KiB or not UTF-8")));
+            }
+            Some(Ok(line)) => line,
+        };
+        let parsed = match format {
+            PoseFormat::JsonLines => json::parse_header(&line),
+            PoseFormat::Csv => csv::parse_header(&line).map(|header| JsonHeader {
+                header,
+                metres_per_unit: 1.0,
+            }),
+        };
+        reader.stream = parsed.map_err(|fault| header(&reader, fault))?;
+        reader.validator = Validator::new(reader.stream.header.points.len());
+        Ok(reader)
+    }
+
+    /// Names and dimension. Channels that only turn up in samples are appended while reading.
+    pub fn header(&self) -> &PoseHeader {
+        &self.stream.header
+    }
+
+    /// Samples dropped so far, by reason.
+    pub fn counts(&self) -> &FaultCounts {
+        self.validator.counts()
+    }
+
+    /// The number of the last line read, from 1.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// Reads the next good sample into `sample`; false at the end of the input.
+    ///
+    /// # Errors
+    /// Unreadable input, ten bad samples in a row.
+    pub fn read_into(&mut self, sample: &mut PoseSample) -> Result<bool, PoseError> {
+        loop {
+            let Some(line) = self.next_line()? else {
+                return Ok(false);
+            };
+            let parsed = line.and_then(|line| self.parse(&line, sample));
+            let outcome = match parsed {
+                Ok(false) => continue,
+                Ok(true) => self.validator.check(sample).map(|()| sample.t),
+                Err(fault) => Err(fault),
+            };
+            match self.validator.note(self.line, outcome) {
+                Ok(true) => return Ok(true),
+                Ok(false) => {}
+                Err(first) => {
+                    return Err(PoseError::TooManyBad {
+                        file: self.file.clone(),
+                        line: first.line,
+                        fault: first.fault,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Parses a line; false where it is no sample and no fault (the header said again).
+    fn parse(&mut self, line: &str, sample: &mut PoseSample) -> Result<bool, SampleFault> {
+        match self.format {
+            PoseFormat::Csv => csv::parse_sample(line, &self.stream.header, sample)?,
+            PoseFormat::JsonLines => {
+                if json::looks_like_header(line) {
+                    // Senders repeat their header; another one would change the meaning of points.
+                    return match json::parse_header(line) {
+                        Ok(again) if again.header.points == self.stream.header.points => Ok(false),
+                        _ => Err(SampleFault::Malformed {
+                            detail: "another header in the middle of the stream".into(),
+                        }),
+                    };
+                }
+                json::parse_sample(line, &mut self.stream, sample)?;
+            }
+        }
+        Ok(true)
+    }
+
+    /// The next non-empty line; inner errors are faults of that line alone.
+    fn next_line(&mut self) -> Result<Option<Result<String, SampleFault>>, PoseError> {
+        loop {
+            self.bytes.clear();
+            let limit = MAX_LINE_BYTES as u64 + 2;
+            let read = (&mut self.input)
+                .take(limit)
+                .read_until(b'\n', &mut self.bytes)
+                .map_err(|source| PoseError::Read {
+                    file: self.file.clone(),
+                    source,
+                })?;
+            if read == 0 {
+                return Ok(None);
+            }
+            self.line += 1;
+            let ended = self.bytes.last() == Some(&b'\n');
+            while matches!(self.bytes.last(), Some(b'\n' | b'\r')) {
+                self.bytes.pop();
+            }
+            if self.bytes.len() > MAX_LINE_BYTES {
+                if !ended {
+                    self.skip_line()?;
+                }
+                return Ok(Some(Err(SampleFault::LineTooLong)));
+            }
+            match std::str::from_utf8(&self.bytes) {
+                Ok(line) if line.trim().is_empty() => {}
+                Ok(line) => return Ok(Some(Ok(line.to_owned()))),
+                Err(_) => {
+                    return Ok(Some(Err(SampleFault::Malformed {
+                        detail: "not UTF-8 text".into(),
+                    })));
+                }
+            }
+        }
+    }
+
+    /// Throws away the rest of an over-long line without keeping it in memory.
+    fn skip_line(&mut self) -> Result<(), PoseError> {
+        self.input
+            .skip_until(b'\n')
+            .map(|_| ())
+            .map_err(|source| PoseError::Read {
+                file: self.file.clone(),
+                source,
+            })
+    }
+}
+
+impl<R: BufRead> Iterator for PoseReader<R> {
+    type Item = Result<PoseSample, PoseError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.done {
+            return None;
+        }
+        let mut sample = PoseSample::default();
+        match self.read_into(&mut sample) {
+            Ok(true) => Some(Ok(sample)),
+            Ok(false) => {
+                self.done = true;
+                None
+            }
+            Err(error) => {
+                self.done = true;
+                Some(Err(error))
+            }
+        }
+    }
+}
