@@ -1,6 +1,7 @@
 //! The command line: one file per command, exit codes, messages.
 
 mod failure;
+mod sim;
 
 pub use failure::{ExitStatus, Failure};
 
@@ -16,14 +17,17 @@ struct Cli {
 }
 
 #[derive(Subcommand, Debug)]
-enum Command {}
+enum Command {
+    /// Simulated servos for any client
+    Sim(sim::SimArgs),
+}
 
 /// Parses the command line, runs the command, prints its failure and returns its exit code.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome: Result<ExitStatus, Failure> = match cli.command {
         None => Ok(ExitStatus::Done),
-        Some(command) => match command {},
+        Some(Command::Sim(args)) => sim::run(args),
     };
     match outcome {
         Ok(status) => status.into(),

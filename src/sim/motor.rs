@@ -149,7 +149,9 @@ impl Profile {
         let change = acceleration.map_or(f64::INFINITY, |a| a * SUBSTEP_S);
         self.speed_rad_s += (wanted - self.speed_rad_s).clamp(-change, change);
         let travel = self.speed_rad_s * SUBSTEP_S;
-        if travel.abs() >= left.abs() && travel * left >= 0.0 && self.speed_rad_s.abs() <= change * 4.0
+        if travel.abs() >= left.abs()
+            && travel * left >= 0.0
+            && self.speed_rad_s.abs() <= change * 4.0
         {
             self.angle_rad = goal_rad;
             self.speed_rad_s = 0.0;

@@ -228,7 +228,11 @@ impl Servo {
             status |= 1;
         }
         if on_the_way {
-            let shape = if self.setpoint.acceleration.is_some() { 3 } else { 1 };
+            let shape = if self.setpoint.acceleration.is_some() {
+                3
+            } else {
+                1
+            };
             status |= 1 << 1 | shape << 4;
         }
         if positioning && (path - pulses).abs() > FOLLOWING_ERROR_PULSES {
@@ -316,14 +320,18 @@ impl Servo {
                     let allowed = limit(addr::MIN_POSITION_LIMIT)..=limit(addr::MAX_POSITION_LIMIT);
                     allowed.contains(&value)
                 }
-                _ => value.abs() <= 256 * 4096 - 1,
+                _ => value.abs() < 256 * 4096,
             },
             addr::OPERATING_MODE if !self.modes().contains(&(value as u8)) => {
                 return Err(TableError::Range);
             }
             _ => true,
         };
-        if within { Ok(()) } else { Err(TableError::Limit) }
+        if within {
+            Ok(())
+        } else {
+            Err(TableError::Limit)
+        }
     }
 
     /// Forgets full turns: the position comes back into 0..4095, apart from the homing offset.
@@ -352,7 +360,7 @@ impl Servo {
         if restore & 2 != 0
             && let Some(backup) = &self.backup
         {
-            self.table.copy_gains(backup);
+            self.table.copy_from(backup, is_backed_up_ram);
         }
         self.held_write = None;
         self.table.set(addr::TORQUE_ENABLE, i64::from(restore & 1));
@@ -424,8 +432,8 @@ impl Servo {
             return;
         }
         let whole_s = f64::from(self.table.get(addr::PROFILE_VELOCITY)) * 1e-3;
-        let ramp_s = (f64::from(self.table.get(addr::PROFILE_ACCELERATION)) * 1e-3)
-            .min(0.5 * whole_s);
+        let ramp_s =
+            (f64::from(self.table.get(addr::PROFILE_ACCELERATION)) * 1e-3).min(0.5 * whole_s);
         let way = (self.setpoint.goal_rad - self.profile.angle_rad).abs();
         let speed = (whole_s > 0.0 && way > 0.0).then(|| way / (whole_s - ramp_s));
         self.setpoint.acceleration = speed.filter(|_| ramp_s > 0.0).map(|v| v / ramp_s);
@@ -533,6 +541,16 @@ impl Servo {
     }
 }
 
+/// The RAM registers that a backup holds: gains and profile.
+pub(super) fn is_backed_up_ram(register: u16) -> bool {
+    matches!(
+        register,
+        addr::VELOCITY_I_GAIN
+            ..=addr::FEEDFORWARD_1ST_GAIN | addr::PROFILE_ACCELERATION | addr::PROFILE_VELOCITY
+    )
+}
+
+/// What the control loop decides in a substep.
 struct Control {
     duty: Option<f64>,
     path_ended: bool,

@@ -5,7 +5,10 @@ use std::ops::RangeInclusive;
 
 /// Register addresses that the simulated servo itself looks at (X series).
 pub mod addr {
-    #![allow(missing_docs, reason = "the names are those of the vendor's control table")]
+    #![allow(
+        missing_docs,
+        reason = "the names are those of the vendor's control table"
+    )]
     pub const MODEL_NUMBER: u16 = 0;
     pub const FIRMWARE_VERSION: u16 = 6;
     pub const ID: u16 = 7;
@@ -324,6 +327,19 @@ impl ControlTable {
         }
     }
 
+    /// Takes over every writable register of `other` whose address `which` accepts.
+    pub fn copy_from(&mut self, other: &ControlTable, which: impl Fn(u16) -> bool) {
+        for register in &self.registers {
+            if register.writable && which(register.addr) {
+                let first = usize::from(register.addr);
+                let span = first..first + usize::from(register.size);
+                if let Some(bytes) = other.bytes.get(span.clone()) {
+                    self.bytes[span].copy_from_slice(bytes);
+                }
+            }
+        }
+    }
+
     /// The register that the byte at `addr` belongs to.
     pub fn register_at(&self, addr: u16) -> Option<&Register> {
         let index = *self.map.get(usize::from(addr))?;
@@ -391,8 +407,8 @@ impl ControlTable {
             }
             let size = usize::from(register.size);
             let bytes = data.get(at..at + size).ok_or(TableError::Length)?;
-            let whole = (0..size)
-                .all(|i| self.resolve(addr + (at + i) as u16) == register.addr + i as u16);
+            let whole =
+                (0..size).all(|i| self.resolve(addr + (at + i) as u16) == register.addr + i as u16);
             if !whole {
                 return Err(TableError::Length);
             }
@@ -438,7 +454,10 @@ mod tests {
             Err(TableError::Access)
         );
         assert_eq!(table.check_write(71, &[0], any), Err(TableError::Access));
-        assert_eq!(table.check_write(660, &[0; 9], any), Err(TableError::Access));
+        assert_eq!(
+            table.check_write(660, &[0; 9], any),
+            Err(TableError::Access)
+        );
         assert_eq!(
             table.check_write(116, &[0; 2], any),
             Err(TableError::Length)
