@@ -142,8 +142,12 @@ impl Profile {
         };
         let left = goal_rad - self.angle_rad;
         let wanted = match acceleration {
-            // The speed from which the path can still stop at the goal, half a substep ahead.
-            Some(a) => (2.0 * a * left.abs()).sqrt().min(speed) * left.signum(),
+            // The speed from which the path can still stop at the goal, in whole substeps.
+            Some(a) => {
+                let half = 0.5 * SUBSTEP_S;
+                let stopping = a * ((half * half + 2.0 * left.abs() / a).sqrt() - half);
+                stopping.min(speed) * left.signum()
+            }
             None => speed * left.signum(),
         };
         let change = acceleration.map_or(f64::INFINITY, |a| a * SUBSTEP_S);
@@ -221,7 +225,7 @@ mod tests {
                     "acceleration {change:.2} of {acceleration} rad/s^2"
                 );
                 assert!(
-                    path.angle_rad.abs() <= goal.abs() + 1e-9,
+                    path.angle_rad.abs() <= goal.abs() + 1e-6,
                     "overshoot to {} of {goal}",
                     path.angle_rad
                 );
