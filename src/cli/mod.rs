@@ -4,6 +4,7 @@ pub mod clip;
 mod failure;
 pub mod gesture;
 pub mod poses;
+pub mod sim;
 
 pub use failure::{ExitStatus, Failure};
 
@@ -26,6 +27,8 @@ enum Command {
     Poses(poses::PosesArgs),
     /// Bring motion in; author gaits for a legged robot
     Clip(clip::ClipArgs),
+    /// Simulated servos on a pseudo-terminal, for any client
+    Sim(sim::SimArgs),
 }
 
 /// Parses the command line, runs the command, prints its failure and returns its exit code.
@@ -36,6 +39,7 @@ pub fn main() -> ExitCode {
         Some(Command::Gesture(args)) => gesture::run(args),
         Some(Command::Poses(args)) => poses::run(args),
         Some(Command::Clip(args)) => clip::run(&args),
+        Some(Command::Sim(args)) => sim::run(args),
     };
     match outcome {
         Ok(status) => status.into(),
