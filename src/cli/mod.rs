@@ -1,5 +1,6 @@
 //! The command line: one file per command, exit codes, messages.
 
+mod bus;
 mod failure;
 
 pub use failure::{ExitStatus, Failure};
@@ -16,14 +17,16 @@ struct Cli {
 }
 
 #[derive(Subcommand, Debug)]
-enum Command {}
+enum Command {
+    Bus(bus::BusArgs),
+}
 
 /// Parses the command line, runs the command, prints its failure and returns its exit code.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome: Result<ExitStatus, Failure> = match cli.command {
         None => Ok(ExitStatus::Done),
-        Some(command) => match command {},
+        Some(Command::Bus(args)) => bus::run(args),
     };
     match outcome {
         Ok(status) => status.into(),
