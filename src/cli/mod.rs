@@ -1,5 +1,6 @@
 //! The command line: one file per command, exit codes, messages.
 
+pub mod bus;
 pub mod clip;
 mod failure;
 pub mod gesture;
@@ -27,6 +28,8 @@ enum Command {
     Poses(poses::PosesArgs),
     /// Bring motion in; author gaits for a legged robot
     Clip(clip::ClipArgs),
+    /// Look at and set up servos on a bus
+    Bus(bus::BusArgs),
     /// Simulated servos on a pseudo-terminal, for any client
     Sim(sim::SimArgs),
 }
@@ -39,6 +42,7 @@ pub fn main() -> ExitCode {
         Some(Command::Gesture(args)) => gesture::run(args),
         Some(Command::Poses(args)) => poses::run(args),
         Some(Command::Clip(args)) => clip::run(&args),
+        Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),
     };
     match outcome {
