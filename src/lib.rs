@@ -9,6 +9,7 @@ pub mod gesture;
 pub mod live;
 pub mod motion;
 pub mod pose;
+pub mod puppet;
 pub mod robot;
 pub mod sim;
 pub mod view;

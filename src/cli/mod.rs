@@ -5,7 +5,10 @@ pub mod clip;
 mod failure;
 pub mod gesture;
 pub mod poses;
+pub mod run;
 pub mod sim;
+mod summary;
+mod targets;
 
 pub use failure::{ExitStatus, Failure};
 
@@ -22,6 +25,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// The main job: poses in, servos move
+    Run(run::RunArgs),
     /// Record gestures from one example, estimate their waves, check them
     Gesture(gesture::GestureArgs),
     /// Pose streams: import, info, compose
@@ -38,7 +43,8 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome: Result<ExitStatus, Failure> = match cli.command {
-        None => Ok(ExitStatus::Done),
+        None => run::run(&run::RunArgs::default()),
+        Some(Command::Run(args)) => run::run(&args),
         Some(Command::Gesture(args)) => gesture::run(args),
         Some(Command::Poses(args)) => poses::run(args),
         Some(Command::Clip(args)) => clip::run(&args),

@@ -1,1 +1,13 @@
-//! Typed configuration, checked at load.
+//! Typed configuration: one TOML file names a whole character; checked at load, built into parts.
+//!
+//! [`file`] is what a user writes, [`files`] where its parts are read from (a folder, or those
+//! embedded in the program), [`build`] checks it and makes the parts, [`error`] tells what is wrong.
+
+pub mod build;
+pub mod error;
+pub mod file;
+pub mod files;
+
+pub use build::{Character, ServoEntry, load};
+pub use error::ConfigError;
+pub use files::Files;

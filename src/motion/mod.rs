@@ -18,3 +18,4 @@ pub mod weights;
 
 pub use animator::Animator;
 pub use clip::{Clip, ClipError};
+pub use smooth::ease;

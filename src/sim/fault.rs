@@ -165,6 +165,24 @@ impl FaultSpec {
     pub fn is_active(&self, now: Time) -> bool {
         self.from <= now && self.until.is_none_or(|until| now < until)
     }
+
+    /// The same fault on a clock that reads `start` when this one's reads zero.
+    pub fn shifted(&self, start: Time) -> Self {
+        let shift = start.saturating_since(Time::ZERO);
+        Self {
+            from: self.from + shift,
+            until: self.until.map(|until| until + shift),
+            ..*self
+        }
+    }
+
+    /// The servo it happens to; `None` for the whole line.
+    pub fn servo(&self) -> Option<u8> {
+        match self.target {
+            Target::Servo(id) => Some(id),
+            Target::Bus => None,
+        }
+    }
 }
 
 /// Why a fault specification is refused.

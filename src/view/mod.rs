@@ -1,1 +1,59 @@
-//! Terminal view of a run.
+//! What a person sees of a run: the terminal view, or a line now and then where there is no terminal.
+
+#[cfg(feature = "tui")]
+mod draw;
+mod lines;
+#[cfg(feature = "tui")]
+mod terminal;
+mod watch;
+
+use crate::config::Character;
+use crate::live::{CycleRecord, StopSwitch};
+use lines::Lines;
+#[cfg(feature = "tui")]
+use terminal::Terminal;
+
+/// How a run is shown.
+pub enum Display {
+    /// Not at all.
+    Quiet,
+    /// A line of text every second.
+    Lines(Lines),
+    /// The whole terminal.
+    #[cfg(feature = "tui")]
+    Terminal(Box<Terminal>),
+}
+
+impl Display {
+    /// The best display that standard output allows. Keys on the terminal press `stop`.
+    pub fn open(character: &Character, stop: &StopSwitch) -> Self {
+        #[cfg(feature = "tui")]
+        if std::io::IsTerminal::is_terminal(&std::io::stdout())
+            && let Ok(terminal) = Terminal::open(character, stop)
+        {
+            return Display::Terminal(Box::new(terminal));
+        }
+        let _ = stop;
+        Display::Lines(Lines::new(character))
+    }
+
+    /// Counts one cycle.
+    pub fn count(&mut self, record: &CycleRecord) {
+        match self {
+            Display::Quiet => {}
+            Display::Lines(lines) => lines.count(record),
+            #[cfg(feature = "tui")]
+            Display::Terminal(terminal) => terminal.count(record),
+        }
+    }
+
+    /// Shows the newest cycle.
+    pub fn draw(&mut self, newest: &CycleRecord) {
+        match self {
+            Display::Quiet => {}
+            Display::Lines(lines) => lines.draw(newest),
+            #[cfg(feature = "tui")]
+            Display::Terminal(terminal) => terminal.draw(newest),
+        }
+    }
+}

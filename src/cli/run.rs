@@ -1,0 +1,255 @@
+//! `handwave run`: the main job. Poses in, servos move.
+
+use super::summary;
+use super::targets::TargetsFile;
+use super::{ExitStatus, Failure};
+use crate::base::{Clock, VirtualClock};
+use crate::bus::BusAddress;
+use crate::config::files::BUILT_IN;
+use crate::config::{self, Character, Files};
+use crate::live::control::Ending;
+use crate::live::session::{self, Observer, Report, Session};
+use crate::live::source::{self, SourceReader};
+use crate::live::wire::{self, WireError};
+use crate::live::{CycleRecord, RealClock, StopSwitch};
+use crate::sim::FaultSpec;
+use crate::view::Display;
+use clap::{Args, ValueEnum};
+use std::io::BufRead;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Arguments of `handwave run`.
+#[derive(Args, Debug, Default)]
+#[command(after_help = "Examples:
+  handwave run                                        the built-in quadruped, simulated, with a recorded performer
+  handwave run --bus dynamixel:/dev/ttyUSB0@1000000   the same on real servos
+  handwave run my_robot.toml --input file:take3.jsonl
+  handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
+  handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
+
+Ctrl-C once: the robot comes to rest, lies down, torque goes off. Twice: torque goes off at once.
+Exit codes: 0 done, 2 bad usage, config or input, 3 bus failure, 4 safety stop, 130 interrupted.")]
+pub struct RunArgs {
+    /// A character (default: the built-in quadruped)
+    config: Option<PathBuf>,
+    /// Pose source in place of the configuration's, such as file:take.jsonl
+    #[arg(long, value_name = "SOURCE")]
+    input: Option<String>,
+    /// Bus in place of the configuration's: sim, dynamixel:PATH@BAUD
+    #[arg(long, value_name = "BUS")]
+    bus: Option<String>,
+    /// Control cycles per second
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Bring the run to its end after this many seconds
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    /// real: by the clock; max: time comes from the input, as fast as it computes
+    #[arg(long, value_enum, default_value_t = Speed::Real)]
+    speed: Speed,
+    /// No view; a summary at the end
+    #[arg(long)]
+    headless: bool,
+    /// Write one row of joint targets per control cycle
+    #[arg(long, value_name = "FILE.csv")]
+    targets: Option<PathBuf>,
+    /// Inject a fault into the simulated bus: ID:NAME[=VALUE]@T1s[..T2s] or bus:NAME...
+    /// (`handwave sim dynamixel --list-faults`)
+    #[arg(long, value_name = "SPEC")]
+    fault: Vec<String>,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Where time comes from.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Speed {
+    /// The clock.
+    #[default]
+    Real,
+    /// The input.
+    Max,
+}
+
+/// Runs `handwave run`.
+pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
+    let mut character = match &args.config {
+        None => config::load(Files::Embedded, BUILT_IN),
+        Some(path) => {
+            let (files, name) = Files::of(path);
+            config::load(files, &name)
+        }
+    }
+    .map_err(Failure::input)?;
+    if let Some(bus) = &args.bus {
+        character.bus = bus
+            .parse()
+            .map_err(|e| Failure::input(format!("--bus {bus}: {e}")))?;
+    }
+    let rate_hz = args.rate.unwrap_or(character.rate_hz);
+    if !(10.0..=2000.0).contains(&rate_hz) {
+        return Err(Failure::input(format!(
+            "--rate {rate_hz} is not in 10..2000 Hz"
+        )));
+    }
+    if let Some(d) = args.duration
+        && !(d > 0.0)
+    {
+        return Err(Failure::input(format!("--duration {d} must be above 0 s")));
+    }
+    let faults = faults(args, &character)?;
+    if args.speed == Speed::Max && character.bus != BusAddress::Sim {
+        return Err(Failure::input(
+            "--speed max would drive the servos on a real bus faster than real time; it works with --bus sim only",
+        ));
+    }
+    let reader = match &args.input {
+        Some(input) => source::open(input, &source::working_folder()),
+        None => source::open(&character.source, &character.files),
+    }
+    .map_err(Failure::input)?;
+    let targets = args
+        .targets
+        .as_ref()
+        .map(|path| {
+            TargetsFile::create(path, &character.joints)
+                .map_err(|e| Failure::input(format!("--targets {}: {e}", path.display())))
+        })
+        .transpose()?;
+    let stop = StopSwitch::new();
+    stop.on_signals()
+        .map_err(|e| Failure::input(format!("cannot listen for signals: {e}")))?;
+    let mut onlooker = Onlooker {
+        targets,
+        display: Display::Quiet,
+        newest: CycleRecord::default(),
+    };
+    let report = match args.speed {
+        Speed::Max => {
+            let clock = VirtualClock::new();
+            let shared: Arc<dyn Clock> = Arc::new(clock.clone());
+            let session = session(args, &character, rate_hz, reader, faults, shared, stop)?;
+            session::run_virtual(session, &clock, &mut onlooker)
+        }
+        Speed::Real => {
+            let clock: Arc<dyn Clock> = Arc::new(RealClock::new());
+            if !args.headless {
+                onlooker.display = Display::open(&character, &stop);
+            }
+            let session = session(
+                args,
+                &character,
+                rate_hz,
+                reader,
+                faults,
+                Arc::clone(&clock),
+                stop,
+            )?;
+            let ran = session::run_real(session, clock, &mut onlooker, character.view_hz);
+            onlooker.display = Display::Quiet;
+            ran.map_err(Failure::input)?
+        }
+    };
+    if let Some(targets) = onlooker.targets {
+        targets.finish().map_err(Failure::input)?;
+    }
+    conclude(args, report, &character)
+}
+
+fn faults(args: &RunArgs, character: &Character) -> Result<Vec<FaultSpec>, Failure> {
+    if !args.fault.is_empty() && character.bus != BusAddress::Sim {
+        return Err(Failure::input(
+            "--fault works on the simulated bus inside this process only; give it to `handwave sim dynamixel` instead",
+        ));
+    }
+    let ids: Vec<u8> = character.servos.iter().map(|s| s.id).collect();
+    args.fault
+        .iter()
+        .map(|text| {
+            let fault: FaultSpec = text
+                .parse()
+                .map_err(|e| Failure::input(format!("--fault: {e}")))?;
+            match fault.servo() {
+                Some(id) if !ids.contains(&id) => Err(Failure::input(format!(
+                    "--fault {text}: there is no servo {id}; servos: {ids:?}"
+                ))),
+                _ => Ok(fault),
+            }
+        })
+        .collect()
+}
+
+/// Opens the bus and puts the session together.
+fn session(
+    args: &RunArgs,
+    character: &Character,
+    rate_hz: f64,
+    reader: SourceReader,
+    faults: Vec<FaultSpec>,
+    clock: Arc<dyn Clock>,
+    stop: StopSwitch,
+) -> Result<Session<Box<dyn BufRead + Send>>, Failure> {
+    let puppet = session::puppet(character, reader.header(), rate_hz).map_err(Failure::input)?;
+    let wire = wire::open(character, &character.bus, clock, rate_hz).map_err(|e| match e {
+        WireError::Port(_) => Failure::bus(e),
+        other => Failure::input(other),
+    })?;
+    let line = wire.line;
+    Ok(Session {
+        puppet,
+        bus: wire.bus,
+        reader,
+        stop,
+        options: session::control_options(character, rate_hz, args.duration),
+        on_start: Box::new(move |start| {
+            if let Some(line) = &line {
+                wire::inject(line, &faults, start);
+            }
+        }),
+    })
+}
+
+/// Prints the summary and turns the ending into an exit code.
+fn conclude(args: &RunArgs, report: Report, character: &Character) -> Result<ExitStatus, Failure> {
+    if args.json {
+        println!("{}", summary::to_json(&report, character));
+    } else {
+        print!("{}", summary::to_text(&report, character));
+    }
+    let end = |status, message: String| Failure { status, message };
+    if let Some(error) = report.pose_error {
+        return Err(Failure::input(error));
+    }
+    match report.ending {
+        Ending::Complete => Ok(ExitStatus::Done),
+        Ending::Interrupted => Ok(ExitStatus::Interrupted),
+        Ending::SafetyStop(reason) => Err(end(
+            ExitStatus::SafetyStop,
+            format!("safety stop: {reason}"),
+        )),
+        Ending::Bus(error) => Err(Failure::bus(error)),
+    }
+}
+
+/// Writes targets and feeds the view.
+struct Onlooker {
+    targets: Option<TargetsFile>,
+    display: Display,
+    newest: CycleRecord,
+}
+
+impl Observer for Onlooker {
+    fn cycle(&mut self, record: &CycleRecord) {
+        if let Some(targets) = &mut self.targets {
+            targets.row(record);
+        }
+        self.newest.clone_from(record);
+        self.display.count(record);
+    }
+
+    fn tick(&mut self) {
+        self.display.draw(&self.newest);
+    }
+}

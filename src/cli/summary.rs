@@ -1,0 +1,146 @@
+//! The summary at the end of a run, for people and as JSON.
+
+use crate::config::Character;
+use crate::live::control::Ending;
+use crate::live::session::Report;
+use serde_json::{Value, json};
+
+/// The summary as one JSON object.
+pub fn to_json(report: &Report, character: &Character) -> Value {
+    let stats = &report.stats;
+    let faults: Vec<Value> = stats
+        .faults
+        .iter()
+        .map(|f| {
+            json!({
+                "servo": character.servos[f.joint].id, "joint": character.joints[f.joint],
+                "fault": f.kind.as_str(), "from_s": f.from_s, "to_s": f.to_s,
+            })
+        })
+        .collect();
+    let dropped: serde_json::Map<String, Value> = report
+        .dropped
+        .by_reason()
+        .into_iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(reason, n)| (reason.into(), n.into()))
+        .collect();
+    json!({
+        "ending": ending_word(&report.ending),
+        "cycles": stats.cycles, "overruns": stats.overruns, "missed_cycles": stats.missed,
+        "envelope_cycles": stats.held_back,
+        "transitions": report.transitions.completed, "transitions_aborted": report.transitions.aborted,
+        "samples": stats.samples, "samples_dropped": dropped, "samples_refused": report.refused,
+        "poses_lost_cycles": stats.poses_lost,
+        "bus_errors": stats.silent + stats.damaged, "replies_missing": stats.silent,
+        "frames_damaged": stats.damaged, "bus_bytes": stats.bytes,
+        "faults": faults, "more_faults": stats.more_faults,
+        "pose_to_wire_us": stats.pose_to_wire.percentiles(), "bus_cycle_us": stats.exchange.percentiles(),
+        "step_us": stats.step.percentiles(), "lateness_us": stats.lateness.percentiles(),
+        "records_lost": report.records_lost,
+        "torque_off": report.torque.as_ref().map(|t| t.confirmed_off.clone()),
+        "torque_unconfirmed": report.torque.as_ref().map(|t| t.unconfirmed.clone()),
+    })
+}
+
+/// The summary as text.
+pub fn to_text(report: &Report, character: &Character) -> String {
+    let stats = &report.stats;
+    let line = |p: crate::live::stats::Percentiles| {
+        format!("p50 {} us, p99 {} us, max {} us", p.p50, p.p99, p.max)
+    };
+    let share = |n: u64| 100.0 * n as f64 / stats.cycles.max(1) as f64;
+    let mut text = format!(
+        "{}: {}\n\
+         cycles        {}, overruns {} ({:.2} %), bus late {} ({:.2} %)\n\
+         envelope      acted in {} cycles\n\
+         transitions   {} done, {} aborted\n\
+         poses         {} used, {} dropped{}\n\
+         bus           {} replies missing, {} frames damaged, {:.1} MB\n\
+         pose to wire  {}\n\
+         bus cycle     {}\n\
+         step          {}\n\
+         lateness      {}\n",
+        character.name,
+        ending_word(&report.ending),
+        stats.cycles,
+        stats.overruns,
+        share(stats.overruns),
+        stats.missed,
+        share(stats.missed),
+        stats.held_back,
+        report.transitions.completed,
+        report.transitions.aborted,
+        stats.samples,
+        report.dropped.total() + report.refused,
+        reasons(report),
+        stats.silent,
+        stats.damaged,
+        stats.bytes as f64 / 1e6,
+        line(stats.pose_to_wire.percentiles()),
+        line(stats.exchange.percentiles()),
+        line(stats.step.percentiles()),
+        line(stats.lateness.percentiles()),
+    );
+    for fault in &stats.faults {
+        let until = fault.to_s.map_or("the end".into(), |t| format!("{t:.3} s"));
+        text += &format!(
+            "fault         servo {} (joint {}) {} from {:.3} s to {until}\n",
+            character.servos[fault.joint].id,
+            character.joints[fault.joint],
+            fault.kind.as_str(),
+            fault.from_s,
+        );
+    }
+    if stats.more_faults > 0 {
+        text += &format!("fault         and {} more\n", stats.more_faults);
+    }
+    if let Some(torque) = &report.torque {
+        text += &format!(
+            "torque        off, read back from {} of {} servos\n",
+            torque.confirmed_off.len(),
+            character.joints.len()
+        );
+        for (joint, reason) in &torque.unconfirmed {
+            text += &format!("torque        NOT confirmed off: joint {joint}: {reason}\n");
+        }
+    }
+    if report.records_lost > 0 {
+        text += &format!(
+            "note          {} cycles are missing in view and targets: the disk or terminal was too slow\n",
+            report.records_lost
+        );
+    }
+    for note in report
+        .notes
+        .iter()
+        .chain(report.real_time.iter().flat_map(|r| &r.notes))
+    {
+        text += &format!("note          {note}\n");
+    }
+    text
+}
+
+fn reasons(report: &Report) -> String {
+    let list: Vec<String> = report
+        .dropped
+        .by_reason()
+        .into_iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(reason, n)| format!("{n} {reason}"))
+        .collect();
+    if list.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", list.join(", "))
+    }
+}
+
+fn ending_word(ending: &Ending) -> &'static str {
+    match ending {
+        Ending::Complete => "performance complete",
+        Ending::Interrupted => "interrupted",
+        Ending::SafetyStop(_) => "safety stop",
+        Ending::Bus(_) => "bus failure",
+    }
+}

@@ -1,0 +1,296 @@
+//! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+/// A whole character.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CharacterFile {
+    /// Name for people.
+    pub name: String,
+    /// Where poses come from.
+    pub input: Input,
+    /// Gesture files.
+    pub gesture: Vec<GestureEntry>,
+    /// Motion classes, the nodes of the graph.
+    pub class: Vec<ClassEntry>,
+    /// Additive layers.
+    #[serde(default)]
+    pub layer: Vec<LayerEntry>,
+    /// Edges and thresholds.
+    #[serde(default)]
+    pub graph: GraphEntry,
+    /// The robot.
+    pub robot: RobotEntry,
+    /// The bus.
+    pub bus: BusEntry,
+    /// Ramps, safe states, what to do when something is lost.
+    #[serde(default)]
+    pub safety: SafetyEntry,
+    /// The terminal view.
+    #[serde(default)]
+    pub view: ViewEntry,
+}
+
+/// Where poses come from.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Input {
+    /// `file:PATH`.
+    pub source: Spanned<String>,
+    /// Estimator of waves.
+    #[serde(default)]
+    pub estimator: Option<Spanned<String>>,
+    /// Window of the wave filters in periods.
+    #[serde(default)]
+    pub window: Option<f64>,
+}
+
+/// A file of gestures.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GestureEntry {
+    /// Path of the gestures file.
+    pub file: Spanned<String>,
+}
+
+/// A motion class.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClassEntry {
+    /// Class name.
+    pub name: Spanned<String>,
+    /// The gesture that drives it.
+    pub gesture: Spanned<String>,
+    /// Its example clips.
+    pub clip: Vec<ClipEntry>,
+}
+
+/// An example clip of a class.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClipEntry {
+    /// Path of the clip.
+    pub file: Spanned<String>,
+    /// Gesture amplitude at which it is played pure.
+    #[serde(default = "one")]
+    pub amplitude: f64,
+    /// Gesture frequency at which it is played pure, Hz.
+    #[serde(default)]
+    pub frequency_hz: f64,
+}
+
+/// An additive layer.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LayerEntry {
+    /// Layer name.
+    pub name: String,
+    /// The channel that drives it.
+    pub channel: Spanned<String>,
+    /// Path of the clip whose end is weight 1.
+    pub clip: Spanned<String>,
+    /// Channel values at the lowest and the highest weight.
+    pub range: Spanned<[f64; 2]>,
+    /// Weight runs from 0 to 1 instead of -1 to +1.
+    #[serde(default)]
+    pub one_sided: bool,
+    /// Part of the range that counts as nothing.
+    #[serde(default)]
+    pub dead_zone: f64,
+}
+
+/// Edges and thresholds of the motion graph.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GraphEntry {
+    /// Class played when nothing is performed; the first class when not given.
+    pub start: Option<Spanned<String>>,
+    /// Edges as `["from", "to"]`; all pairs when not given.
+    pub edges: Option<Vec<Spanned<[String; 2]>>>,
+    /// Activation that starts a transition.
+    pub rise: Option<f64>,
+    /// Activation below which it is aborted.
+    pub abort: Option<f64>,
+    /// Activation of the source below which it succeeds.
+    pub release: Option<f64>,
+    /// Length of a blend, seconds.
+    pub blend_s: Option<f64>,
+    /// Idle time before the start class comes back, seconds.
+    pub idle_s: Option<f64>,
+}
+
+/// The robot.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotEntry {
+    /// Path of the URDF.
+    pub urdf: Spanned<String>,
+    /// Acceleration every joint may use, rad/s^2.
+    pub acceleration_rad_s2: f64,
+    /// Share of the URDF's velocity limits to use.
+    #[serde(default = "one")]
+    pub velocity_share: f64,
+    /// Joint to servo.
+    pub joint: Vec<JointEntry>,
+}
+
+/// One joint and its servo.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointEntry {
+    /// Joint name as in the URDF.
+    pub name: Spanned<String>,
+    /// Servo id on the bus.
+    pub servo: Spanned<u8>,
+    /// Servo position at joint position zero, pulses.
+    #[serde(default = "centre_pulse")]
+    pub zero_pulse: i32,
+    /// +1 or -1.
+    #[serde(default = "plus_one")]
+    pub direction: i8,
+    /// Lowest and highest servo position, pulses.
+    #[serde(default = "full_range")]
+    pub range_pulse: Spanned<[i32; 2]>,
+}
+
+/// The bus.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BusEntry {
+    /// `sim` or a bus such as `dynamixel:/dev/ttyUSB0@1000000`.
+    pub bus: String,
+    /// Baud rate of the simulated line.
+    #[serde(default = "one_megabaud")]
+    pub baud: u32,
+    /// Servo model that the configuration expects.
+    #[serde(default = "servo_model")]
+    pub model: Spanned<String>,
+    /// Control cycles per second.
+    #[serde(default = "control_rate")]
+    pub rate_hz: f64,
+    /// The servos stop by themselves after this long without a packet, ms; 0 is off.
+    #[serde(default = "watchdog")]
+    pub watchdog_ms: u32,
+}
+
+/// Ramps and safe states.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SafetyEntry {
+    /// Least time from the present pose to the first pose, seconds.
+    #[serde(default = "two")]
+    pub ramp_s: f64,
+    /// Path of a clip whose end is the end pose; the rest pose when not given.
+    pub end_clip: Option<Spanned<String>>,
+    /// Least time into the end pose, seconds.
+    #[serde(default = "two")]
+    pub end_ramp_s: f64,
+    /// From computing a target to the servo acting on it, seconds.
+    #[serde(default = "actuation_delay")]
+    pub actuation_delay_s: f64,
+    /// Poses may be missing this long before gestures fade, seconds.
+    #[serde(default = "coast")]
+    pub coast_s: f64,
+    /// Poses count as lost after this long, seconds.
+    #[serde(default = "one")]
+    pub lost_s: f64,
+    /// `idle` or `stop`.
+    #[serde(default)]
+    pub on_lost: OnLost,
+    /// Torque of a servo at the end of a run; only `torque_off` in this version.
+    #[serde(default)]
+    pub on_exit: OnExit,
+}
+
+/// What happens when poses are lost.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnLost {
+    /// Come to rest and wait.
+    #[default]
+    Idle,
+    /// Lie down, torque off, exit code 4.
+    Stop,
+}
+
+/// Servo state at the end of a run.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnExit {
+    /// End pose, then torque off, read back.
+    #[default]
+    TorqueOff,
+    /// End pose, torque stays on.
+    Hold,
+}
+
+/// The terminal view.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewEntry {
+    /// Pictures per second.
+    #[serde(default = "refresh")]
+    pub refresh_hz: f64,
+}
+
+impl Default for SafetyEntry {
+    fn default() -> Self {
+        Self {
+            ramp_s: two(),
+            end_clip: None,
+            end_ramp_s: two(),
+            actuation_delay_s: actuation_delay(),
+            coast_s: coast(),
+            lost_s: one(),
+            on_lost: OnLost::default(),
+            on_exit: OnExit::default(),
+        }
+    }
+}
+
+impl Default for ViewEntry {
+    fn default() -> Self {
+        Self {
+            refresh_hz: refresh(),
+        }
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+fn two() -> f64 {
+    2.0
+}
+fn coast() -> f64 {
+    0.3
+}
+fn actuation_delay() -> f64 {
+    0.02
+}
+fn refresh() -> f64 {
+    20.0
+}
+fn control_rate() -> f64 {
+    200.0
+}
+fn watchdog() -> u32 {
+    200
+}
+fn one_megabaud() -> u32 {
+    1_000_000
+}
+fn servo_model() -> Spanned<String> {
+    Spanned::new(0..0, "xl430-w250".into())
+}
+fn centre_pulse() -> i32 {
+    2048
+}
+fn plus_one() -> i8 {
+    1
+}
+fn full_range() -> Spanned<[i32; 2]> {
+    Spanned::new(0..0, [0, 4095])
+}

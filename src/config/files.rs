@@ -1,0 +1,78 @@
+//! Where the files that a configuration names are read from.
+
+use super::error::ConfigError;
+use std::path::{Path, PathBuf};
+
+/// A place with a character's files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Files {
+    /// Files next to a configuration on disk.
+    Folder(PathBuf),
+    /// The files of the built-in quadruped, part of the program.
+    Embedded,
+}
+
+/// The built-in character's configuration.
+pub const BUILT_IN: &str = "quadruped.toml";
+
+/// Embeds files of `configs/` by their path in it.
+macro_rules! embed {
+    ($($path:literal),* $(,)?) => {
+        &[$(($path, include_str!(concat!("../../configs/", $path)))),*]
+    };
+}
+
+const EMBEDDED: &[(&str, &str)] = embed![
+    "quadruped.toml",
+    "robots/pup.urdf",
+    "gestures/hand.toml",
+    "performances/drum_and_splay.jsonl",
+    "clips/stand.json",
+    "clips/walk_short.json",
+    "clips/walk_long.json",
+    "clips/trot_short.json",
+    "clips/trot_long.json",
+    "clips/bow.json",
+    "clips/crouch.json",
+    "clips/heading.json",
+    "clips/lie.json",
+];
+
+impl Files {
+    /// Text of the file at `path`, relative to this place.
+    pub fn read(&self, path: &str) -> Result<String, ConfigError> {
+        let cannot = |problem: String| ConfigError {
+            file: self.name(path),
+            line: None,
+            key: String::new(),
+            problem,
+        };
+        match self {
+            Files::Folder(folder) => std::fs::read_to_string(folder.join(path))
+                .map_err(|e| cannot(format!("cannot be read: {e}"))),
+            Files::Embedded => EMBEDDED
+                .iter()
+                .find(|(name, _)| *name == path)
+                .map(|(_, text)| (*text).to_string())
+                .ok_or_else(|| cannot("is not one of the built-in files".into())),
+        }
+    }
+
+    /// The file at `path` as a name for messages.
+    pub fn name(&self, path: &str) -> String {
+        match self {
+            Files::Folder(folder) => folder.join(path).display().to_string(),
+            Files::Embedded => format!("built-in {path}"),
+        }
+    }
+
+    /// The folder and file name of a configuration on disk.
+    pub fn of(config: &Path) -> (Self, String) {
+        let folder = config.parent().map(Path::to_path_buf).unwrap_or_default();
+        let name = config
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        (Files::Folder(folder), name)
+    }
+}

@@ -1,0 +1,224 @@
+//! The control loop: fixed rate, absolute deadlines, one exchange with the bus per cycle.
+
+use super::feed::Feed;
+use super::record::Recorder;
+use super::stats::Stats;
+use super::stop::{StopRequest, StopSwitch};
+use crate::base::{Clock, JointState, Time};
+use crate::bus::{BusError, CycleReport, ServoBus, TorqueReport};
+use crate::pose::PoseSample;
+use crate::puppet::{Inputs, Puppet, Stage};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+/// How a run is driven.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct ControlOptions {
+    /// Control cycles per second.
+    pub rate_hz: f64,
+    /// The run is brought to its end after this long, seconds.
+    pub duration_s: Option<f64>,
+    /// Torque is switched off at the end of an orderly run.
+    pub torque_off_at_end: bool,
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub enum Ending {
+    /// The performance or the set duration is over.
+    Complete,
+    /// The operator stopped it.
+    Interrupted,
+    /// The robot was stopped for safety, with the reason.
+    SafetyStop(String),
+    /// The bus failed.
+    Bus(BusError),
+}
+
+/// What a run leaves behind.
+#[derive(Debug)]
+pub struct Outcome {
+    /// How it ended.
+    pub ending: Ending,
+    /// What it measured.
+    pub stats: Stats,
+    /// Torque read back at the end; `None` when the bus was already lost, or torque stays on.
+    pub torque: Option<TorqueReport>,
+}
+
+/// The parts a control loop works with.
+pub struct Parts<'a> {
+    /// The pure step.
+    pub puppet: &'a mut Puppet,
+    /// The servos.
+    pub bus: &'a mut dyn ServoBus,
+    /// The poses.
+    pub feed: &'a mut dyn Feed,
+    /// The time, shared with the bus.
+    pub clock: &'a dyn Clock,
+    /// Signals and keys.
+    pub stop: &'a StopSwitch,
+    /// Who looks on.
+    pub recorder: &'a mut dyn Recorder,
+    /// Called once with the time of cycle 0 on `clock`.
+    pub on_start: &'a mut dyn FnMut(Time),
+}
+
+/// After this many cycles missed in a row time is not caught up but stopped: the host was suspended.
+const CATCH_UP_AT_MOST: i64 = 50;
+/// Time in the end pose before torque goes off, so that lagging servos arrive, seconds.
+const REST_AT_END_S: f64 = 0.3;
+/// Most samples handed to one cycle.
+const SAMPLES_PER_CYCLE: usize = 64;
+
+/// Runs from a safe start to the declared end. Torque is switched off on every way out but an
+/// orderly end with `torque_off_at_end` unset; that includes a panic of the step.
+pub fn run(mut parts: Parts<'_>, options: &ControlOptions) -> Outcome {
+    let mut stats = Stats::default();
+    let ending = match catch_unwind(AssertUnwindSafe(|| cycles(&mut parts, options, &mut stats))) {
+        Ok(Ok(ending)) => ending,
+        Ok(Err(error)) => Ending::Bus(error),
+        Err(_) => Ending::SafetyStop(
+            "an internal error stopped the control loop (its message is above); please report it"
+                .into(),
+        ),
+    };
+    let keep_torque = matches!(ending, Ending::Complete) && !options.torque_off_at_end;
+    let torque = if keep_torque {
+        None
+    } else {
+        parts.bus.torque_off().ok()
+    };
+    Outcome {
+        ending,
+        stats,
+        torque,
+    }
+}
+
+fn cycles(
+    parts: &mut Parts<'_>,
+    options: &ControlOptions,
+    stats: &mut Stats,
+) -> Result<Ending, BusError> {
+    let joints = parts.bus.joints().len();
+    let mut states = vec![JointState::default(); joints];
+    parts.bus.prepare(&mut states)?;
+    if parts.stop.request() != StopRequest::None {
+        return Ok(Ending::Interrupted);
+    }
+    let present: Vec<f64> = states.iter().map(|s| s.position).collect();
+    parts.bus.arm()?;
+    parts.puppet.begin(Time::ZERO, &present);
+
+    let dt_s = 1.0 / options.rate_hz;
+    let mut samples: Vec<PoseSample> = Vec::with_capacity(SAMPLES_PER_CYCLE);
+    let mut start = parts.clock.now();
+    (parts.on_start)(start);
+    let mut input_begun = false;
+    let mut rest_cycles = (REST_AT_END_S * options.rate_hz) as u64;
+    let mut lost_for_good = false;
+    let mut cycle: i64 = 0;
+    loop {
+        let deadline = start + Duration::from_secs_f64(cycle as f64 * dt_s);
+        parts.clock.sleep_until(deadline);
+        let late_s = parts.clock.now().secs_since(deadline).max(0.0);
+        stats.lateness.add((late_s * 1e6) as u64);
+        let mut behind = (late_s / dt_s) as i64;
+        stats.overruns += behind as u64;
+        if behind > CATCH_UP_AT_MOST {
+            start = start + Duration::from_secs_f64(behind as f64 * dt_s);
+            behind = 0;
+        }
+        // Missed cycles are computed, so that motion has no gap in time; only the last one is sent.
+        let mut newest_sample_s = None;
+        for k in cycle..=cycle + behind {
+            let last = k == cycle + behind;
+            let t_s = k as f64 * dt_s;
+            parts.feed.take(t_s, &mut samples);
+            stats.samples += samples.len() as u64;
+            newest_sample_s = samples.last().map(|s| s.t).or(newest_sample_s);
+            let request = parts.stop.request();
+            if request == StopRequest::AtOnce {
+                return Ok(Ending::Interrupted);
+            }
+            let finish = request == StopRequest::Orderly
+                || parts.feed.ended()
+                || options.duration_s.is_some_and(|d| t_s >= d);
+            let inputs = Inputs {
+                samples: &samples,
+                states: &states,
+                finish,
+            };
+            let before = Instant::now();
+            let targets = parts.puppet.step(Time::from_secs(t_s), &inputs);
+            let step_us = before.elapsed().as_micros() as u64;
+            stats.step.add(step_us);
+            stats.cycles += 1;
+            stats.held_back += u64::from(targets.held_back > 0);
+            stats.poses_lost += u64::from(targets.poses_lost);
+            lost_for_good |= targets.poses_lost && targets.stage == Stage::Settling;
+            parts.feed.give_back(&mut samples);
+            let report = if last {
+                send(parts, &mut states, newest_sample_s, start, stats)?
+            } else {
+                CycleReport::default()
+            };
+            if last {
+                stats.bus(t_s, &report);
+                let next = deadline + Duration::from_secs_f64((behind + 1) as f64 * dt_s);
+                stats.missed += u64::from(parts.clock.now() > next);
+            }
+            if let Some(record) = parts.recorder.slot() {
+                record.fill(parts.puppet, &states);
+                record.t_s = t_s;
+                record.bus = report;
+                record.late_us = (late_s * 1e6) as u64;
+                record.step_us = step_us;
+                record.overruns = stats.overruns;
+                parts.recorder.commit();
+            }
+            let stage = parts.puppet.stage();
+            if stage == Stage::Playing && !input_begun {
+                parts.feed.begin(t_s + dt_s);
+                input_begun = true;
+            }
+            if stage == Stage::Done {
+                rest_cycles = rest_cycles.saturating_sub(1);
+            }
+        }
+        if rest_cycles == 0 {
+            break;
+        }
+        cycle += behind + 1;
+    }
+    Ok(if lost_for_good {
+        Ending::SafetyStop(
+            "no poses came for longer than safety.lost_s, and safety.on_lost is \"stop\"".into(),
+        )
+    } else if parts.stop.request() == StopRequest::None {
+        Ending::Complete
+    } else {
+        Ending::Interrupted
+    })
+}
+
+/// One exchange with the bus; counts the way from the newest sample to the wire.
+fn send(
+    parts: &mut Parts<'_>,
+    states: &mut [JointState],
+    newest_sample_s: Option<f64>,
+    start: Time,
+    stats: &mut Stats,
+) -> Result<CycleReport, BusError> {
+    let began = parts.clock.now();
+    let report = parts
+        .bus
+        .exchange(&parts.puppet.targets().positions, states)?;
+    if let Some(arrived_s) = newest_sample_s {
+        let sent = began + Duration::from_micros(u64::from(report.goal_sent_us));
+        let waited_s = sent.secs_since(start) - arrived_s;
+        stats.pose_to_wire.add((waited_s.max(0.0) * 1e6) as u64);
+    }
+    Ok(report)
+}

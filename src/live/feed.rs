@@ -1,0 +1,224 @@
+//! Feeds: pose samples at the time they are due, on the control clock.
+
+use crate::pose::{FaultCounts, PoseError, PoseReader, PoseSample};
+use rtrb::{Consumer, Producer, RingBuffer};
+use std::io::BufRead;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Gives the control loop its pose samples. Called once per cycle: must not block or allocate.
+pub trait Feed {
+    /// The stream's first sample is due at `at_s` on the control clock.
+    fn begin(&mut self, at_s: f64);
+    /// Appends the samples due by `now_s` to `out`, with `t` on the control clock.
+    fn take(&mut self, now_s: f64, out: &mut Vec<PoseSample>);
+    /// Takes used samples back for re-use.
+    fn give_back(&mut self, used: &mut Vec<PoseSample>);
+    /// The stream is over and all its samples were taken.
+    fn ended(&self) -> bool;
+}
+
+/// Maps the stream's time to the control clock.
+#[derive(Copy, Clone, Debug, Default)]
+struct Schedule {
+    begins_at_s: Option<f64>,
+    first_t: Option<f64>,
+}
+
+impl Schedule {
+    /// When a sample stamped `t` is due; `None` before the stream has begun.
+    fn due(&mut self, t: f64) -> Option<f64> {
+        let begins = self.begins_at_s?;
+        let first = *self.first_t.get_or_insert(t);
+        Some(begins + (t - first))
+    }
+}
+
+/// Reads a recording in the caller's thread: for virtual time.
+pub struct ReaderFeed<R> {
+    reader: PoseReader<R>,
+    schedule: Schedule,
+    next: Option<PoseSample>,
+    spare: Vec<PoseSample>,
+    over: bool,
+    error: Option<PoseError>,
+}
+
+impl<R: BufRead> ReaderFeed<R> {
+    /// A feed of `reader`.
+    pub fn new(reader: PoseReader<R>) -> Self {
+        Self {
+            reader,
+            schedule: Schedule::default(),
+            next: None,
+            spare: Vec::new(),
+            over: false,
+            error: None,
+        }
+    }
+
+    /// Samples dropped by reason, and the error that ended the stream, if one did.
+    pub fn finish(self) -> (FaultCounts, Option<PoseError>) {
+        (self.reader.counts().clone(), self.error)
+    }
+
+    fn fetch(&mut self) {
+        if self.next.is_some() || self.over {
+            return;
+        }
+        let mut sample = self.spare.pop().unwrap_or_default();
+        match self.reader.read_into(&mut sample) {
+            Ok(true) => self.next = Some(sample),
+            Ok(false) => self.over = true,
+            Err(error) => {
+                self.over = true;
+                self.error = Some(error);
+            }
+        }
+    }
+}
+
+impl<R: BufRead> Feed for ReaderFeed<R> {
+    fn begin(&mut self, at_s: f64) {
+        self.schedule.begins_at_s = Some(at_s);
+    }
+
+    fn take(&mut self, now_s: f64, out: &mut Vec<PoseSample>) {
+        loop {
+            self.fetch();
+            let Some(mut sample) = self.next.take() else {
+                return;
+            };
+            match self.schedule.due(sample.t) {
+                Some(due) if due <= now_s => {
+                    sample.t = due;
+                    out.push(sample);
+                }
+                _ => {
+                    self.next = Some(sample);
+                    return;
+                }
+            }
+        }
+    }
+
+    fn give_back(&mut self, used: &mut Vec<PoseSample>) {
+        self.spare.append(used);
+    }
+
+    fn ended(&self) -> bool {
+        self.over && self.next.is_none()
+    }
+}
+
+/// What travels from the reading thread to the control thread.
+enum Item {
+    Sample(PoseSample),
+    End,
+}
+
+/// The control thread's end of a recording that another thread reads ahead.
+pub struct QueueFeed {
+    items: Consumer<Item>,
+    used: Producer<PoseSample>,
+    schedule: Schedule,
+    next: Option<PoseSample>,
+    over: bool,
+}
+
+/// The reading thread; ends when the stream does or the feed is dropped.
+pub type ReaderThread = JoinHandle<(FaultCounts, Option<PoseError>)>;
+
+/// Samples read ahead.
+const AHEAD: usize = 512;
+
+/// Reads `reader` ahead in a thread of its own.
+pub fn read_ahead<R: BufRead + Send + 'static>(
+    mut reader: PoseReader<R>,
+) -> std::io::Result<(QueueFeed, ReaderThread)> {
+    let (mut items_in, items_out) = RingBuffer::new(AHEAD);
+    let (used_in, mut used_out) = RingBuffer::<PoseSample>::new(AHEAD);
+    let thread = std::thread::Builder::new()
+        .name("poses".into())
+        .spawn(move || {
+            let mut error = None;
+            loop {
+                let mut sample = used_out.pop().unwrap_or_default();
+                let item = match reader.read_into(&mut sample) {
+                    Ok(true) => Item::Sample(sample),
+                    Ok(false) => Item::End,
+                    Err(e) => {
+                        error = Some(e);
+                        Item::End
+                    }
+                };
+                let end = matches!(item, Item::End);
+                let mut waiting = Some(item);
+                while let Some(item) = waiting.take() {
+                    if items_in.is_abandoned() {
+                        return (reader.counts().clone(), error);
+                    }
+                    if let Err(rtrb::PushError::Full(item)) = items_in.push(item) {
+                        waiting = Some(item);
+                        std::thread::sleep(Duration::from_millis(5));
+                    }
+                }
+                if end {
+                    return (reader.counts().clone(), error);
+                }
+            }
+        })?;
+    Ok((
+        QueueFeed {
+            items: items_out,
+            used: used_in,
+            schedule: Schedule::default(),
+            next: None,
+            over: false,
+        },
+        thread,
+    ))
+}
+
+impl Feed for QueueFeed {
+    fn begin(&mut self, at_s: f64) {
+        self.schedule.begins_at_s = Some(at_s);
+    }
+
+    fn take(&mut self, now_s: f64, out: &mut Vec<PoseSample>) {
+        loop {
+            if self.next.is_none() && !self.over {
+                match self.items.pop() {
+                    Ok(Item::Sample(sample)) => self.next = Some(sample),
+                    Ok(Item::End) => self.over = true,
+                    Err(_) => {}
+                }
+            }
+            let Some(mut sample) = self.next.take() else {
+                return;
+            };
+            match self.schedule.due(sample.t) {
+                // `out` has room for what one cycle can bring; the rest waits for the next cycle.
+                Some(due) if due <= now_s && out.len() < out.capacity() => {
+                    sample.t = due;
+                    out.push(sample);
+                }
+                _ => {
+                    self.next = Some(sample);
+                    return;
+                }
+            }
+        }
+    }
+
+    fn give_back(&mut self, used: &mut Vec<PoseSample>) {
+        for sample in used.drain(..) {
+            // Never full: it has as many places as there are samples under way.
+            let _ = self.used.push(sample);
+        }
+    }
+
+    fn ended(&self) -> bool {
+        self.over && self.next.is_none()
+    }
+}

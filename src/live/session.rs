@@ -1,0 +1,244 @@
+//! A session: a character, its poses and its bus, run to the end in real or in virtual time.
+
+use super::control::{self, ControlOptions, Ending, Outcome, Parts};
+use super::feed::{ReaderFeed, read_ahead};
+use super::realtime::{self, RealTime};
+use super::record::{CycleRecord, Inline, record_queue};
+use super::stats::Stats;
+use super::stop::StopSwitch;
+use crate::base::{Clock, Time, VirtualClock};
+use crate::bus::{ServoBus, TorqueReport};
+use crate::config::file::{OnExit, OnLost};
+use crate::config::{Character, ConfigError};
+use crate::gesture::{FrontEnd, FrontEndError};
+use crate::motion::graph::TransitionCounts;
+use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader};
+use crate::puppet::{LostPolicy, Puppet, PuppetOptions};
+use std::io::BufRead;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What a session left behind.
+#[derive(Debug)]
+pub struct Report {
+    /// How it ended.
+    pub ending: Ending,
+    /// What the loop measured.
+    pub stats: Stats,
+    /// Torque read back at the end.
+    pub torque: Option<TorqueReport>,
+    /// Transitions of the motion graph.
+    pub transitions: TransitionCounts,
+    /// Pose samples dropped, by reason.
+    pub dropped: FaultCounts,
+    /// Samples that the front end refused.
+    pub refused: u64,
+    /// Why the pose stream ended early, if it did.
+    pub pose_error: Option<PoseError>,
+    /// Cycles that were not recorded because the observer was slow.
+    pub records_lost: u64,
+    /// What the system granted the control thread (real time only).
+    pub real_time: Option<RealTime>,
+    /// What the bus found worth telling.
+    pub notes: Vec<String>,
+}
+
+/// Why a session could not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// Gestures and stream do not fit.
+    #[error("{0}")]
+    FrontEnd(#[from] FrontEndError),
+    /// The configuration does not fit the stream.
+    #[error("{0}")]
+    Config(#[from] ConfigError),
+    /// A thread could not be started.
+    #[error("cannot start a thread: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// Builds the puppet of `character` for a stream with `header`, at `rate_hz`.
+pub fn puppet(
+    character: &Character,
+    header: &PoseHeader,
+    rate_hz: f64,
+) -> Result<Puppet, SessionError> {
+    let front = FrontEnd::new(&character.gestures, header, character.front_options)?;
+    let mut animator = character.animator(&front)?;
+    let end_pose = character.end_pose.clone().unwrap_or_else(|| {
+        let mut rest = vec![0.0; character.joints.len()];
+        animator.rest_pose(&mut rest);
+        rest
+    });
+    let safety = &character.safety;
+    let dt_s = 1.0 / rate_hz;
+    Ok(Puppet::new(
+        front,
+        animator,
+        character.envelope(dt_s),
+        character.classes.iter().map(|c| c.gesture).collect(),
+        end_pose,
+        PuppetOptions {
+            dt_s,
+            ramp_s: safety.ramp_s,
+            end_ramp_s: safety.end_ramp_s,
+            actuation_delay_s: safety.actuation_delay_s,
+            coast_s: safety.coast_s,
+            lost_s: safety.lost_s,
+            on_lost: match safety.on_lost {
+                OnLost::Idle => LostPolicy::Idle,
+                OnLost::Stop => LostPolicy::Stop,
+            },
+        },
+    ))
+}
+
+/// Options of the control loop for `character`.
+pub fn control_options(
+    character: &Character,
+    rate_hz: f64,
+    duration_s: Option<f64>,
+) -> ControlOptions {
+    ControlOptions {
+        rate_hz,
+        duration_s,
+        torque_off_at_end: character.safety.on_exit == OnExit::TorqueOff,
+    }
+}
+
+/// Looks on while a session runs.
+pub trait Observer {
+    /// Sees every cycle, in order.
+    fn cycle(&mut self, record: &CycleRecord);
+    /// Called some times a second in real time; never in virtual time.
+    fn tick(&mut self);
+}
+
+/// A session ready to run.
+pub struct Session<R> {
+    /// The pure step.
+    pub puppet: Puppet,
+    /// The servos; on the same clock as the run.
+    pub bus: Box<dyn ServoBus>,
+    /// The poses.
+    pub reader: PoseReader<R>,
+    /// Signals and keys.
+    pub stop: StopSwitch,
+    /// Rate, duration, what happens at the end.
+    pub options: ControlOptions,
+    /// Called with the bus clock's time of cycle 0, right after the servos were armed.
+    pub on_start: Box<dyn FnMut(Time) + Send>,
+}
+
+/// Runs in virtual time, in this thread: as fast as it computes, the same bytes every time.
+///
+/// The session's bus must live on `clock`.
+pub fn run_virtual<R: BufRead>(
+    mut session: Session<R>,
+    clock: &VirtualClock,
+    observer: &mut dyn Observer,
+) -> Report {
+    let mut feed = ReaderFeed::new(session.reader);
+    let mut recorder = Inline::new(&session.puppet, |record| observer.cycle(record));
+    let outcome = control::run(
+        Parts {
+            puppet: &mut session.puppet,
+            bus: session.bus.as_mut(),
+            feed: &mut feed,
+            clock,
+            stop: &session.stop,
+            recorder: &mut recorder,
+            on_start: session.on_start.as_mut(),
+        },
+        &session.options,
+    );
+    let read = feed.finish();
+    report(
+        outcome,
+        &session.puppet,
+        session.bus.as_ref(),
+        read,
+        0,
+        None,
+    )
+}
+
+/// Records kept between the control thread and this one: ten seconds at 200 Hz.
+const RECORDS: usize = 2048;
+
+/// Runs in real time: the control loop on a thread of its own, the reader on another; the observer
+/// looks on in this one and is ticked about `tick_hz` times a second.
+pub fn run_real<R: BufRead + Send + 'static>(
+    session: Session<R>,
+    clock: Arc<dyn Clock>,
+    observer: &mut dyn Observer,
+    tick_hz: f64,
+) -> Result<Report, SessionError> {
+    let (mut feed, reading) = read_ahead(session.reader)?;
+    let (mut recorder, mut records) = record_queue(&session.puppet, RECORDS);
+    let (mut puppet, mut bus, mut on_start) = (session.puppet, session.bus, session.on_start);
+    let (stop, options) = (session.stop, session.options);
+    let control = std::thread::Builder::new()
+        .name("control".into())
+        .spawn(move || {
+            let real_time = realtime::request();
+            let outcome = control::run(
+                Parts {
+                    puppet: &mut puppet,
+                    bus: bus.as_mut(),
+                    feed: &mut feed,
+                    clock: clock.as_ref(),
+                    stop: &stop,
+                    recorder: &mut recorder,
+                    on_start: on_start.as_mut(),
+                },
+                &options,
+            );
+            (outcome, puppet, bus, recorder.lost(), real_time)
+        })?;
+    let period = Duration::from_secs_f64(1.0 / tick_hz);
+    while !control.is_finished() {
+        std::thread::sleep(period);
+        records.drain(|record| observer.cycle(record));
+        observer.tick();
+    }
+    let finished = control.join();
+    records.drain(|record| observer.cycle(record));
+    let Ok((outcome, puppet, bus, lost, real_time)) = finished else {
+        // The loop itself catches panics of the step; only its own end could get here.
+        return Err(SessionError::Thread(std::io::Error::other(
+            "the control thread ended abnormally; the servos' own watchdog stops them",
+        )));
+    };
+    let read = reading.join().unwrap_or_default();
+    Ok(report(
+        outcome,
+        &puppet,
+        bus.as_ref(),
+        read,
+        lost,
+        Some(real_time),
+    ))
+}
+
+fn report(
+    outcome: Outcome,
+    puppet: &Puppet,
+    bus: &dyn ServoBus,
+    (dropped, pose_error): (FaultCounts, Option<PoseError>),
+    records_lost: u64,
+    real_time: Option<RealTime>,
+) -> Report {
+    Report {
+        ending: outcome.ending,
+        stats: outcome.stats,
+        torque: outcome.torque,
+        transitions: puppet.animator().counts(),
+        dropped,
+        refused: puppet.rejected_samples(),
+        pose_error,
+        records_lost,
+        real_time,
+        notes: bus.notes().to_vec(),
+    }
+}

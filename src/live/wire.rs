@@ -1,0 +1,143 @@
+//! Opens the bus of a character: simulated servos in this process, or a serial port.
+
+use crate::base::{Clock, Time};
+use crate::bus::dynamixel::{
+    ChainOptions, Client, DynamixelChain, Master, MasterOptions, SpecError,
+};
+use crate::bus::{BusAddress, DynamixelBackend, PortError, SerialPort, ServoBus};
+use crate::config::Character;
+use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// An open bus, and the simulated line behind it if there is one.
+pub struct Wire {
+    /// The servos.
+    pub bus: Box<dyn ServoBus>,
+    /// The simulated line, to look at its servos and to inject faults.
+    pub line: Option<SharedLine>,
+}
+
+/// Why a bus cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum WireError {
+    /// The port cannot be opened.
+    #[error("{0}")]
+    Port(#[from] PortError),
+    /// The joint map makes no sense.
+    #[error("{0}")]
+    Servo(#[from] SpecError),
+    /// The simulated line has no such rate.
+    #[error(
+        "bus.baud = {baud}: not a rate that the servos have. Allowed: 9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000"
+    )]
+    Baud {
+        /// As configured.
+        baud: u32,
+    },
+    /// The simulator has no such model.
+    #[error("servo model {0} cannot be simulated")]
+    Model(String),
+    /// The second backend is not built in.
+    #[error(
+        "backend=dynamixel2 is not in this build; build with `--features dxl-serial2` or leave the option out"
+    )]
+    NoBackend,
+}
+
+/// Opens `address` for the servos of `character`, on `clock`, for `rate_hz` cycles per second.
+pub fn open(
+    character: &Character,
+    address: &BusAddress,
+    clock: Arc<dyn Clock>,
+    rate_hz: f64,
+) -> Result<Wire, WireError> {
+    let options = ChainOptions {
+        bus: match address {
+            BusAddress::Sim => "sim".into(),
+            BusAddress::Dynamixel { path, baud, .. } => format!("dynamixel:{path}@{baud}"),
+        },
+        watchdog: character.watchdog_ms.div_ceil(20).min(127) as u8,
+        cycle_budget: Duration::from_secs_f64(1.0 / rate_hz),
+        ..ChainOptions::default()
+    };
+    let (client, line): (Box<dyn Client>, _) = match address {
+        BusAddress::Sim => {
+            let line = simulated_line(character)?;
+            let port = SimPort::new(line.clone(), clock, character.sim_baud);
+            // The simulated adapter has no delay of its own, so a short wait tells silence.
+            let options = MasterOptions {
+                max_allowance: Duration::from_millis(1),
+                ..MasterOptions::default()
+            };
+            (Box::new(Master::new(Box::new(port), options)), Some(line))
+        }
+        BusAddress::Dynamixel {
+            path,
+            baud,
+            backend,
+        } => (serial_client(path, *baud, *backend, clock)?, None),
+    };
+    let chain = DynamixelChain::new(client, character.servos.clone(), options)?;
+    Ok(Wire {
+        bus: Box::new(chain),
+        line,
+    })
+}
+
+fn simulated_line(character: &Character) -> Result<SharedLine, WireError> {
+    let name = character.servos.first().map_or("", |s| s.model.name);
+    let model = sim::table::model(name).ok_or_else(|| WireError::Model(name.into()))?;
+    let ids = character.servos.iter().map(|s| s.id);
+    let line = Line::commissioned(model, ids, character.sim_baud, LineOptions::default()).ok_or(
+        WireError::Baud {
+            baud: character.sim_baud,
+        },
+    )?;
+    Ok(SharedLine::new(line))
+}
+
+#[cfg(feature = "dxl-serial2")]
+fn serial_client(
+    path: &str,
+    baud: u32,
+    backend: DynamixelBackend,
+    clock: Arc<dyn Clock>,
+) -> Result<Box<dyn Client>, WireError> {
+    Ok(match backend {
+        DynamixelBackend::Handwave => own_client(path, baud, clock)?,
+        DynamixelBackend::Dynamixel2 => Box::new(crate::bus::dynamixel::Dynamixel2Client::open(
+            path, baud, clock,
+        )?),
+    })
+}
+
+#[cfg(not(feature = "dxl-serial2"))]
+fn serial_client(
+    path: &str,
+    baud: u32,
+    backend: DynamixelBackend,
+    clock: Arc<dyn Clock>,
+) -> Result<Box<dyn Client>, WireError> {
+    match backend {
+        DynamixelBackend::Handwave => own_client(path, baud, clock),
+        DynamixelBackend::Dynamixel2 => Err(WireError::NoBackend),
+    }
+}
+
+fn own_client(path: &str, baud: u32, clock: Arc<dyn Clock>) -> Result<Box<dyn Client>, WireError> {
+    let port = SerialPort::open(path, baud, clock)?;
+    Ok(Box::new(Master::new(
+        Box::new(port),
+        MasterOptions::default(),
+    )))
+}
+
+/// Injects `faults`, whose times count from `start`. Their servos were checked when they were parsed.
+pub fn inject(line: &SharedLine, faults: &[FaultSpec], start: Time) {
+    let mut line = line.lock();
+    for fault in faults {
+        // Refused only for a servo that is not on the line.
+        let _ = line.inject(fault.shifted(start));
+    }
+}

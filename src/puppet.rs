@@ -1,0 +1,347 @@
+//! The pure step: (time, pose samples, joint states) -> joint targets.
+//!
+//! No I/O, no lock, no clock, and after the first cycles no allocation. Live runs, replays, tests
+//! and benchmarks call this one function, so the same input gives the same bytes out.
+
+use crate::base::{JointState, Time};
+use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
+use crate::motion::Animator;
+use crate::motion::class::Drive;
+use crate::motion::ease;
+use crate::pose::PoseSample;
+use crate::robot::Envelope;
+
+/// What happens when poses have been missing for longer than `lost_s`.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum LostPolicy {
+    /// Come to rest and wait for poses.
+    Idle,
+    /// End the run: settle, lie down, torque off.
+    Stop,
+}
+
+/// Times and policies of a puppet.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct PuppetOptions {
+    /// Control cycle, seconds.
+    pub dt_s: f64,
+    /// Least time of the ramp from the present pose to the first pose, seconds.
+    pub ramp_s: f64,
+    /// Least time of the way into the end pose, seconds.
+    pub end_ramp_s: f64,
+    /// From a target's computation to the instant the servo acts on it, seconds.
+    pub actuation_delay_s: f64,
+    /// Age of the last pose up to which gestures go on in phase, seconds.
+    pub coast_s: f64,
+    /// Age of the last pose from which poses count as lost, seconds.
+    pub lost_s: f64,
+    /// What then happens.
+    pub on_lost: LostPolicy,
+}
+
+/// Where in its run the puppet is.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum Stage {
+    /// Not begun: targets are not to be sent.
+    #[default]
+    Waiting,
+    /// From the present pose to the first pose.
+    Rising,
+    /// Gestures drive the robot.
+    Playing,
+    /// Gestures are released; motion comes to rest.
+    Settling,
+    /// Into the end pose.
+    Lowering,
+    /// In the end pose.
+    Done,
+}
+
+/// What the puppet is given in a cycle.
+#[derive(Copy, Clone, Debug)]
+pub struct Inputs<'a> {
+    /// Pose samples that arrived since the last cycle, oldest first; their `t` is on the clock of `now`.
+    pub samples: &'a [PoseSample],
+    /// Last known state of every joint.
+    pub states: &'a [JointState],
+    /// The performance is over (or the operator wants the end): come to rest and lie down.
+    pub finish: bool,
+}
+
+/// What the puppet gives in a cycle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Targets {
+    /// Joint positions after the envelope, rad, model order.
+    pub positions: Vec<f64>,
+    /// Joints that the envelope had to hold back in this cycle.
+    pub held_back: usize,
+    /// Where in its run the puppet is.
+    pub stage: Stage,
+    /// Age of the last pose, seconds; `None` before the first.
+    pub pose_age_s: Option<f64>,
+    /// Poses are older than the limit while they should be driving the robot.
+    pub poses_lost: bool,
+}
+
+/// A character that is being played: gesture front end, animator, envelope and the stages of a run.
+pub struct Puppet {
+    front: FrontEnd,
+    animator: Animator,
+    envelope: Envelope,
+    /// Per class the gesture that drives it.
+    gesture_of_class: Vec<usize>,
+    end_pose: Vec<f64>,
+    options: PuppetOptions,
+    stage: Stage,
+    stage_since: Time,
+    ramp: Ramp,
+    playing_since: Option<Time>,
+    rejected: u64,
+    estimates: Vec<GestureEstimate>,
+    drives: Vec<Drive>,
+    channels: Vec<f64>,
+    pose: Vec<f64>,
+    last_pose: Vec<f64>,
+    still_s: f64,
+    targets: Targets,
+}
+
+/// An eased way between two poses.
+#[derive(Clone, Debug, Default)]
+struct Ramp {
+    from: Vec<f64>,
+    to: Vec<f64>,
+    seconds: f64,
+}
+
+/// Share of a joint's speed and acceleration that ramps use.
+const RAMP_SHARE: f64 = 0.5;
+/// Slower than this counts as still, rad/s.
+const STILL_RAD_S: f64 = 0.02;
+/// The end is not waited for longer than this after gestures were released, seconds.
+const SETTLE_AT_MOST_S: f64 = 4.0;
+
+impl Puppet {
+    /// Puts the parts together. `gesture_of_class`: per animator class the index of its gesture in
+    /// the front end; `end_pose`: where a run ends, rad, model order.
+    pub fn new(
+        front: FrontEnd,
+        animator: Animator,
+        envelope: Envelope,
+        gesture_of_class: Vec<usize>,
+        end_pose: Vec<f64>,
+        options: PuppetOptions,
+    ) -> Self {
+        let joints = animator.coordinates();
+        let estimates = front.estimates().to_vec();
+        let channels = vec![f64::NAN; front.channel_names().len()];
+        Self {
+            drives: vec![Drive::default(); gesture_of_class.len()],
+            estimates,
+            channels,
+            front,
+            animator,
+            envelope,
+            gesture_of_class,
+            end_pose,
+            options,
+            stage: Stage::Waiting,
+            stage_since: Time::ZERO,
+            ramp: Ramp {
+                from: vec![0.0; joints],
+                to: vec![0.0; joints],
+                seconds: 0.0,
+            },
+            playing_since: None,
+            rejected: 0,
+            pose: vec![0.0; joints],
+            last_pose: vec![0.0; joints],
+            still_s: 0.0,
+            targets: Targets {
+                positions: vec![0.0; joints],
+                ..Targets::default()
+            },
+        }
+    }
+
+    /// Begins a run at `now` from the present joint positions (rad, model order).
+    pub fn begin(&mut self, now: Time, present: &[f64]) {
+        self.envelope.start(present);
+        self.targets.positions.copy_from_slice(present);
+        self.animator.rest_pose(&mut self.pose);
+        self.last_pose.copy_from_slice(&self.pose);
+        self.ramp.to.copy_from_slice(&self.pose);
+        self.start_ramp(self.options.ramp_s);
+        self.enter(Stage::Rising, now);
+    }
+
+    /// One control cycle at `now`. The returned targets have passed the envelope.
+    ///
+    /// Before [`Puppet::begin`] the targets must not be sent: the present position is not known.
+    pub fn step(&mut self, now: Time, inputs: &Inputs<'_>) -> &Targets {
+        for sample in inputs.samples {
+            if self.front.push(sample).is_err() {
+                self.rejected += 1;
+            }
+        }
+        self.targets.poses_lost = false;
+        match self.stage {
+            Stage::Waiting => return &self.targets,
+            Stage::Rising => {
+                if self.follow_ramp(now) {
+                    self.playing_since = Some(now);
+                    self.enter(Stage::Playing, now);
+                }
+                if inputs.finish {
+                    self.lower(now);
+                }
+            }
+            Stage::Playing => {
+                self.play(now, 1.0);
+                if inputs.finish
+                    || (self.targets.poses_lost && self.options.on_lost == LostPolicy::Stop)
+                {
+                    self.still_s = 0.0;
+                    self.enter(Stage::Settling, now);
+                }
+            }
+            Stage::Settling => {
+                self.play(now, 0.0);
+                if self.still_s > 0.2 || now.secs_since(self.stage_since) > SETTLE_AT_MOST_S {
+                    self.lower(now);
+                }
+            }
+            Stage::Lowering => {
+                if self.follow_ramp(now) {
+                    self.enter(Stage::Done, now);
+                }
+            }
+            Stage::Done => self.pose.copy_from_slice(&self.end_pose),
+        }
+        self.targets.held_back = self.envelope.pass(&self.pose, &mut self.targets.positions);
+        self.targets.stage = self.stage;
+        &self.targets
+    }
+
+    /// Drives the animator from the gestures; `share` 0 releases them.
+    fn play(&mut self, now: Time, share: f64) {
+        let actuation = now.secs() + self.options.actuation_delay_s;
+        let started = self.playing_since.map_or(now.secs(), Time::secs);
+        let age = now.secs() - self.front.last_t().map_or(started, |t| t.max(started));
+        self.targets.pose_age_s = self.front.last_t().map(|t| now.secs() - t);
+        self.targets.poses_lost = share > 0.0 && age > self.options.lost_s;
+        // The ladder: in phase while coasting, then eased out until the poses count as lost.
+        let fading = (age - self.options.coast_s) / (self.options.lost_s - self.options.coast_s);
+        let share = share * (1.0 - ease(fading));
+        for (gesture, estimate) in self.estimates.iter_mut().enumerate() {
+            *estimate = self.front.predict(gesture, actuation);
+        }
+        for (drive, gesture) in self.drives.iter_mut().zip(&self.gesture_of_class) {
+            let estimate = &self.estimates[*gesture];
+            *drive = Drive {
+                amplitude: estimate.amplitude * share,
+                frequency_hz: match estimate.kind {
+                    GestureKind::Cyclic => estimate.frequency_hz,
+                    GestureKind::NonCyclic => 0.0,
+                },
+                phase_rad: estimate.phase_rad,
+            };
+        }
+        for (index, value) in self.channels.iter_mut().enumerate() {
+            *value = if share > 0.0 {
+                self.front.channel(index)
+            } else {
+                f64::NAN
+            };
+        }
+        self.animator.step(
+            &self.drives,
+            &self.channels,
+            self.options.dt_s,
+            &mut self.pose,
+        );
+        let fastest = self
+            .pose
+            .iter()
+            .zip(&self.last_pose)
+            .map(|(a, b)| (a - b).abs() / self.options.dt_s)
+            .fold(0.0, f64::max);
+        self.still_s = if fastest < STILL_RAD_S {
+            self.still_s + self.options.dt_s
+        } else {
+            0.0
+        };
+        self.last_pose.copy_from_slice(&self.pose);
+    }
+
+    fn lower(&mut self, now: Time) {
+        self.ramp.to.copy_from_slice(&self.end_pose);
+        self.start_ramp(self.options.end_ramp_s);
+        self.enter(Stage::Lowering, now);
+    }
+
+    /// A ramp from the last targets that keeps well inside every joint's limits.
+    fn start_ramp(&mut self, least_s: f64) {
+        self.ramp.from.copy_from_slice(&self.targets.positions);
+        let mut seconds = least_s;
+        for ((from, to), limit) in self
+            .ramp
+            .from
+            .iter()
+            .zip(&self.ramp.to)
+            .zip(self.envelope.limits())
+        {
+            let way = (to - from).abs();
+            // Peak slope 15/8 and peak curvature 10/sqrt(3) of the eased way.
+            let by_speed = 1.875 * way / (RAMP_SHARE * limit.velocity);
+            let by_acceleration = (5.774 * way / (RAMP_SHARE * limit.acceleration)).sqrt();
+            seconds = seconds.max(by_speed).max(by_acceleration);
+        }
+        self.ramp.seconds = seconds;
+    }
+
+    /// Puts the ramp's pose at `now` into `pose`; true at its end.
+    fn follow_ramp(&mut self, now: Time) -> bool {
+        let u = now.secs_since(self.stage_since) / self.ramp.seconds.max(1e-9);
+        let w = ease(u);
+        for ((pose, from), to) in self.pose.iter_mut().zip(&self.ramp.from).zip(&self.ramp.to) {
+            *pose = from + w * (to - from);
+        }
+        u >= 1.0
+    }
+
+    fn enter(&mut self, stage: Stage, now: Time) {
+        self.stage = stage;
+        self.stage_since = now;
+    }
+
+    /// Where in its run the puppet is.
+    pub fn stage(&self) -> Stage {
+        self.stage
+    }
+
+    /// What the last step gave.
+    pub fn targets(&self) -> &Targets {
+        &self.targets
+    }
+
+    /// Gestures as used in the last step, in file order.
+    pub fn estimates(&self) -> &[GestureEstimate] {
+        &self.estimates
+    }
+
+    /// The animator.
+    pub fn animator(&self) -> &Animator {
+        &self.animator
+    }
+
+    /// Gesture that drives each class.
+    pub fn gesture_of_class(&self) -> &[usize] {
+        &self.gesture_of_class
+    }
+
+    /// Samples that the front end could not use.
+    pub fn rejected_samples(&self) -> u64 {
+        self.rejected
+    }
+}
