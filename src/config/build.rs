@@ -550,7 +550,7 @@ fn class_parts(
                 ));
             }
             let clip = clip(files, &entry.file, "class.clip.file", joints, at)?;
-            if clip.kind == ClipKind::Cycle && entry.frequency_hz <= 0.0 {
+            if clip.kind == ClipKind::Cycle && entry.amplitude > 0.0 && entry.frequency_hz <= 0.0 {
                 return Err(at.at(
                     entry.file.span(),
                     "class.clip.frequency_hz",

@@ -59,7 +59,7 @@ impl<R: BufRead> ReaderFeed<R> {
 
     /// Samples dropped by reason, and the error that ended the stream, if one did.
     pub fn finish(self) -> (FaultCounts, Option<PoseError>) {
-        (self.reader.counts().clone(), self.error)
+        (*self.reader.counts(), self.error)
     }
 
     fn fetch(&mut self) {
@@ -156,7 +156,7 @@ pub fn read_ahead<R: BufRead + Send + 'static>(
                 let mut waiting = Some(item);
                 while let Some(item) = waiting.take() {
                     if items_in.is_abandoned() {
-                        return (reader.counts().clone(), error);
+                        return (*reader.counts(), error);
                     }
                     if let Err(rtrb::PushError::Full(item)) = items_in.push(item) {
                         waiting = Some(item);
@@ -164,7 +164,7 @@ pub fn read_ahead<R: BufRead + Send + 'static>(
                     }
                 }
                 if end {
-                    return (reader.counts().clone(), error);
+                    return (*reader.counts(), error);
                 }
             }
         })?;

@@ -68,13 +68,15 @@ pub enum ClassError {
     },
 }
 
+/// Below this amplitude the pose is the rest pose whatever the phase.
+const AT_REST: f64 = 1e-6;
 /// Movements smaller than this part of the gesture are taken for rest: tremor does not move the puppet.
 const REST_AMPLITUDE: f64 = 0.04;
 /// From here on amplitude counts in full.
 const FULL_FROM_AMPLITUDE: f64 = 0.15;
 /// Share of the joints' speed and acceleration that a steady cycle may use; the rest is for changes
 /// of weights, timelines and phase.
-const RANGE_SHARE: f64 = 0.72;
+const RANGE_SHARE: f64 = 0.65;
 /// The stride is shortened to this part before phase lock is given up.
 const LEAST_STRIDE: f64 = 0.4;
 /// Limbs may gain or lose this part of the phase advance against the body (thesis: 0.95..1.05).
@@ -87,7 +89,12 @@ pub struct MotionClass {
     pub name: String,
     examples: Vec<Example>,
     kind: ClipKind,
+    /// Weights of the moving examples; `moving[i]` is the example of weight i.
     weights_map: Weights,
+    moving: Vec<usize>,
+    /// The example at amplitude 0, and the least amplitude of a moving one.
+    rest: Option<usize>,
+    least_amplitude: f64,
     steepness: Steepness,
     ranges: Vec<JointRange>,
     /// Joints x 1: limb of each joint.
@@ -99,6 +106,7 @@ pub struct MotionClass {
     state: State,
     // Work space, so that a step allocates nothing.
     sampled: Vec<f64>,
+    moving_weights: Vec<f64>,
     weights: Vec<f64>,
 }
 
@@ -139,11 +147,22 @@ impl MotionClass {
         examples: Vec<Example>,
         ranges: Vec<JointRange>,
     ) -> Result<Self, ClassError> {
-        let parameters: Vec<Parameters> = examples.iter().map(|e| e.parameters).collect();
+        let rest = examples.iter().position(|e| e.parameters[0] == 0.0);
+        let mut moving: Vec<usize> = (0..examples.len())
+            .filter(|i| examples[*i].parameters[0] > 0.0)
+            .collect();
+        if moving.is_empty() {
+            moving.extend(0..examples.len());
+        }
+        let parameters: Vec<Parameters> = moving.iter().map(|i| examples[*i].parameters).collect();
         let weights_map = Weights::new(&parameters).map_err(|source| ClassError::Weights {
             class: name.into(),
             source,
         })?;
+        let least_amplitude = parameters
+            .iter()
+            .map(|p| p[0])
+            .fold(f64::INFINITY, f64::min);
         let kind = examples[0].clip.kind;
         if let Some(odd) = examples.iter().find(|e| e.clip.kind != kind) {
             return Err(ClassError::MixedKinds {
@@ -166,7 +185,11 @@ impl MotionClass {
             name: name.into(),
             examples,
             kind,
+            moving_weights: vec![0.0; moving.len()],
             weights_map,
+            moving,
+            rest,
+            least_amplitude,
             steepness,
             ranges,
             limb_of,
@@ -204,8 +227,32 @@ impl MotionClass {
     /// Pose at rest: amplitude or progression zero, into `out`.
     pub fn rest_pose(&mut self, space: &dyn PoseSpace, out: &mut [f64]) {
         let (lowest, _) = self.weights_map.frequencies();
-        self.weights_map.at([0.0, lowest], &mut self.weights);
+        match self.kind {
+            ClipKind::Cycle => self.weigh([0.0, lowest], 1.0),
+            ClipKind::Path => self.weigh([1.0, 0.0], 1.0),
+        }
         self.sample(space, 0.0, out);
+    }
+
+    /// Sets the weights for a wish, with the motion scaled to `stride` of its size.
+    ///
+    /// Between rest and the smallest moving example the motion grows in proportion to amplitude, so
+    /// that amplitude 0 is the rest pose at every frequency and phase.
+    fn weigh(&mut self, wish: Parameters, stride: f64) {
+        self.weights_map.at(wish, &mut self.moving_weights);
+        self.weights.fill(0.0);
+        let share = match self.rest {
+            Some(_) if self.least_amplitude > 0.0 => {
+                stride * (wish[0] / self.least_amplitude).clamp(0.0, 1.0)
+            }
+            _ => 1.0,
+        };
+        for (example, weight) in self.moving.iter().zip(&self.moving_weights) {
+            self.weights[*example] = share * weight;
+        }
+        if let Some(rest) = self.rest {
+            self.weights[rest] += 1.0 - share;
+        }
     }
 
     /// One step of `dt_s` under `drive`; the pose goes into `out`. Allocates nothing.
@@ -244,24 +291,33 @@ impl MotionClass {
             .max(0.0);
         if performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
             let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
+            if amplitude < AT_REST {
+                // Nothing moves yet: begin at the tempo that is shown.
+                state.frequency = Follower::at(goal);
+            }
             state.frequency.step(goal, 12.0, 6.0, dt_s);
         }
         let frequency_hz = state.frequency.value;
-        self.weights_map
-            .at([amplitude, frequency_hz], &mut self.weights);
+        let wish = [amplitude, frequency_hz];
 
         // Range: shorten the stride first, then hold the highest frequency and give up the lock.
+        self.weigh(wish, 1.0);
         let rate = TAU * frequency_hz;
-        let allowed = self
-            .steepness
-            .scale_limit(&self.weights, rate, &self.ranges, RANGE_SHARE);
+        let allowed = self.steepness.scale_limit(
+            &self.weights,
+            rate.max(self.state.rate),
+            &self.ranges,
+            RANGE_SHARE,
+        );
+        let state = &mut self.state;
         let stride_goal = allowed.clamp(LEAST_STRIDE, 1.0);
         // Shorten at once, lengthen at leisure: the limit is the joints', the comfort ours.
-        state.stride = if stride_goal < state.stride {
-            stride_goal
+        let follow = if stride_goal < state.stride {
+            0.05
         } else {
-            state.stride + (stride_goal - state.stride) * (dt_s / 0.15).min(1.0)
+            0.3
         };
+        state.stride += (stride_goal - state.stride) * (dt_s / follow).min(1.0);
         let highest_rate = if allowed < LEAST_STRIDE {
             self.steepness
                 .rate_limit(&self.weights, LEAST_STRIDE, &self.ranges, RANGE_SHARE)
@@ -273,7 +329,7 @@ impl MotionClass {
         let goal_rate = if state.locked {
             // Second-order lock: feed-forward of the gesture's frequency, correction of the phase.
             let lag = wrap_pi(drive.phase_rad - state.phase);
-            let bound = 0.35 * rate;
+            let bound = 0.2 * rate;
             let correction = if wanted > 0.0 && lag.is_finite() {
                 (self.lock_rate * lag).clamp(-bound, bound)
             } else {
@@ -285,7 +341,8 @@ impl MotionClass {
         };
         let follow = 1.0 - (-dt_s / 0.06).exp();
         state.rate += (goal_rate - state.rate) * follow;
-        if amplitude < 1e-4 {
+        let at_rest = amplitude < AT_REST;
+        if at_rest {
             // Standing still: nobody sees the phase, so it may be right when the first step comes.
             state.rate = goal_rate;
             state.phase = drive.phase_rad;
@@ -295,14 +352,13 @@ impl MotionClass {
         }
         let advance = state.rate * dt_s;
         state.phase = wrap_tau(state.phase + advance);
-        self.shift_limbs(advance, amplitude < 1e-4);
+        self.weigh(wish, self.state.stride);
+        self.shift_limbs(advance, at_rest);
 
         let phase = self.state.phase;
-        let stride = self.state.stride;
         self.sample(space, phase, out);
-        self.shorten(space, stride, out);
         let mut velocity = RootAdvance::default();
-        let per_second = self.state.rate / TAU * stride;
+        let per_second = self.state.rate / TAU;
         for (example, weight) in self.examples.iter().zip(&self.weights) {
             velocity.forward_m += weight * example.clip.root.forward_m * per_second;
             velocity.left_m += weight * example.clip.root.left_m * per_second;
@@ -312,7 +368,7 @@ impl MotionClass {
             phase_rad: phase,
             frequency_hz: self.state.rate / TAU,
             amplitude,
-            stride,
+            stride: self.state.stride,
             locked: self.state.locked,
             root_velocity: velocity,
         }
@@ -330,7 +386,7 @@ impl MotionClass {
         } else {
             0.0
         };
-        self.weights_map.at([1.0, 0.0], &mut self.weights);
+        self.weigh([1.0, 0.0], 1.0);
         // Steepness is kept per radian of phase; one progression is one turn of it.
         let fastest = self
             .steepness
@@ -396,29 +452,6 @@ impl MotionClass {
             }
         }
         space.blend(&self.sampled, &self.weights, out);
-    }
-
-    /// Brings the pose towards the example of least amplitude so that `stride` of the way remains.
-    fn shorten(&mut self, space: &dyn PoseSpace, stride: f64, out: &mut [f64]) {
-        if stride >= 1.0 {
-            return;
-        }
-        let joints = out.len();
-        let least = self
-            .examples
-            .iter()
-            .enumerate()
-            .min_by(|(_, a), (_, b)| a.parameters[0].total_cmp(&b.parameters[0]))
-            .map_or(0, |(i, _)| i);
-        // Two rows of the work space serve as a two-pose blend: kept pose, rest pose.
-        if self.examples.len() < 2 {
-            return;
-        }
-        self.sampled[..joints].copy_from_slice(out);
-        for joint in 0..joints {
-            self.sampled[joints + joint] = self.examples[least].clip.sample(0.0, joint);
-        }
-        space.blend(&self.sampled[..2 * joints], &[stride, 1.0 - stride], out);
     }
 }
 
