@@ -2,6 +2,7 @@
 
 mod bus;
 mod failure;
+mod sim;
 
 pub use failure::{ExitStatus, Failure};
 
@@ -19,6 +20,8 @@ struct Cli {
 #[derive(Subcommand, Debug)]
 enum Command {
     Bus(bus::BusArgs),
+    /// Simulated servos for any client
+    Sim(sim::SimArgs),
 }
 
 /// Parses the command line, runs the command, prints its failure and returns its exit code.
@@ -27,6 +30,7 @@ pub fn main() -> ExitCode {
     let outcome: Result<ExitStatus, Failure> = match cli.command {
         None => Ok(ExitStatus::Done),
         Some(Command::Bus(args)) => bus::run(args),
+        Some(Command::Sim(args)) => sim::run(args),
     };
     match outcome {
         Ok(status) => status.into(),

@@ -1,19 +1,18 @@
 //! The real clock.
 
 use crate::base::{Clock, Time};
-use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// Real, monotonic time since the clock was made.
-#[derive(Copy, Clone, Debug)]
+/// The monotonic clock of the system, zero when it was made.
+#[derive(Clone, Debug)]
 pub struct RealClock {
     start: Instant,
 }
 
 impl RealClock {
-    /// A clock that stands at [`Time::ZERO`] now.
+    /// A clock that starts now.
     pub fn new() -> Self {
-        RealClock {
+        Self {
             start: Instant::now(),
         }
     }
@@ -31,6 +30,9 @@ impl Clock for RealClock {
     }
 
     fn sleep_until(&self, time: Time) {
-        thread::sleep(time.saturating_since(self.now()));
+        let wait = time.saturating_since(self.now());
+        if wait > Duration::ZERO {
+            std::thread::sleep(wait);
+        }
     }
 }

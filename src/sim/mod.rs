@@ -1,1 +1,23 @@
 //! The other end of the wire: simulated servos.
+//!
+//! A [`Servo`] is a control table, a motor and the instructions; a [`Line`] is the half-duplex chain
+//! they hang on, with byte-exact times and injected [`fault`]s. Two things carry a line: a
+//! [`SimPort`] inside the process, in virtual or real time, and a [`PtyServer`] on a
+//! pseudo-terminal for any client.
+
+mod chain;
+pub mod fault;
+mod instructions;
+pub mod line;
+pub mod motor;
+pub mod port;
+pub mod pty;
+pub mod servo;
+pub mod table;
+mod wire;
+
+pub use fault::FaultSpec;
+pub use line::{AfterSilence, Line, LineOptions, SharedLine};
+pub use port::SimPort;
+pub use pty::{PtyError, PtyServer};
+pub use servo::Servo;

@@ -1,0 +1,257 @@
+//! `handwave sim`: simulated servos on a pseudo-terminal, for any client.
+
+use super::{ExitStatus, Failure};
+use crate::base::Clock;
+use crate::base::suggest::nearest;
+use crate::live::RealClock;
+use crate::sim::fault::FAULTS;
+use crate::sim::line::SharedLine;
+use crate::sim::table::{self, MODELS, Model};
+use crate::sim::{FaultSpec, Line, LineOptions, PtyServer, Servo};
+use clap::{Args, Subcommand};
+use handwave_dynamixel::{MAX_ID, baud};
+use std::io::{BufRead, Write};
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Arguments of `handwave sim`.
+#[derive(Args, Debug)]
+pub struct SimArgs {
+    #[command(subcommand)]
+    bus: SimBus,
+}
+
+#[derive(Subcommand, Debug)]
+enum SimBus {
+    /// Dynamixel servos (Protocol 2.0) on a pseudo-terminal
+    #[command(after_help = DYNAMIXEL_HELP)]
+    Dynamixel(DynamixelArgs),
+}
+
+const DYNAMIXEL_HELP: &str = "\
+Prints 'ready PATH' when clients may connect, serves them one after another, and ends on Ctrl-C or SIGTERM.
+
+Servos start as commissioned: return delay 0, status return level 2, position mode, torque off, position 2048.
+A servo set to another baud rate than the client's port is silent. A reboot takes a quarter of a second.
+Behind a servo that stays silent in a sync or bulk read, the others answer when its time is over; a fast read ends there.
+
+Examples:
+  handwave sim dynamixel --servos 1-12 --link /tmp/servos
+  handwave sim dynamixel --servos 1-6,20:xl430-w250 --link /tmp/servos --baud 3000000
+  handwave sim dynamixel --servos 1-4 --link /tmp/servos --fault 3:silent@2s..2.5s --fault bus:corrupt=0.01@0s --seed 7
+  handwave sim dynamixel --servos 1-3 --link /tmp/servos --factory     then type: plug 1
+";
+
+#[derive(Args, Debug)]
+struct DynamixelArgs {
+    /// Servo ids and their model: 1-12[:MODEL][,20:MODEL...]; MODEL defaults to xl430-w250
+    #[arg(long, required_unless_present = "list_faults")]
+    servos: Option<String>,
+    /// Where to link the pseudo-terminal; an old link is replaced
+    #[arg(long, value_name = "PATH", required_unless_present = "list_faults")]
+    link: Option<PathBuf>,
+    /// Baud rate the servos are set to
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    baud: u32,
+    /// Answer at once instead of at line speed
+    #[arg(long)]
+    unpaced: bool,
+    /// Servos out of the box: id 1, 57,600 baud, return delay 500 us. Several are off the line until 'plug N'
+    /// is typed on standard input (N as in --servos); 'unplug N' takes one off again
+    #[arg(long, conflicts_with = "baud")]
+    factory: bool,
+    /// Delay of the adapter on the way to the client, milliseconds
+    #[arg(long, value_name = "X", default_value_t = 0.0)]
+    latency_ms: f64,
+    /// Inject a fault: TARGET:NAME[=VALUE]@T1s[..T2s], TARGET an id or 'bus' (repeatable, see --list-faults)
+    #[arg(long = "fault", value_name = "SPEC")]
+    faults: Vec<String>,
+    /// Where chance begins, for faults
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// List the faults, one a line: name, scope, description
+    #[arg(long)]
+    list_faults: bool,
+}
+
+/// Runs `handwave sim`.
+pub fn run(args: SimArgs) -> Result<ExitStatus, Failure> {
+    match args.bus {
+        SimBus::Dynamixel(args) if args.list_faults => list_faults(),
+        SimBus::Dynamixel(args) => dynamixel(&args),
+    }
+}
+
+fn list_faults() -> Result<ExitStatus, Failure> {
+    let mut out = std::io::stdout().lock();
+    for info in FAULTS {
+        // A reader that closed the pipe has seen enough.
+        if writeln!(out, "{} {} {}", info.name, info.scope, info.description).is_err() {
+            break;
+        }
+    }
+    Ok(ExitStatus::Done)
+}
+
+fn dynamixel(args: &DynamixelArgs) -> Result<ExitStatus, Failure> {
+    let (Some(servos), Some(link)) = (&args.servos, &args.link) else {
+        return Err(Failure::input("--servos and --link are needed"));
+    };
+    let servos = parse_servos(servos).map_err(Failure::input)?;
+    let (line, port_baud) = build_line(args, &servos).map_err(Failure::input)?;
+    let line = SharedLine::new(line);
+    let clock: Arc<dyn Clock> = Arc::new(RealClock::new());
+
+    let (stop, stopper) = UnixStream::pair().map_err(Failure::bus)?;
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        let stopper = stopper.try_clone().map_err(Failure::bus)?;
+        signal_hook::low_level::pipe::register(signal, stopper).map_err(Failure::bus)?;
+    }
+    let mut server = PtyServer::open(line.clone(), Arc::clone(&clock), link, port_baud)
+        .map_err(Failure::input)?;
+    if args.factory {
+        std::thread::spawn(move || follow_plugs(&line, clock.as_ref()));
+    }
+    let mut out = std::io::stdout();
+    writeln!(out, "ready {}", link.display())
+        .and_then(|()| out.flush())
+        .map_err(Failure::bus)?;
+    server.serve(stop.as_fd()).map_err(Failure::bus)?;
+    Ok(ExitStatus::Done)
+}
+
+fn build_line(
+    args: &DynamixelArgs,
+    servos: &[(u8, &'static Model)],
+) -> Result<(Line, u32), String> {
+    if !(0.0..=1000.0).contains(&args.latency_ms) {
+        return Err(format!(
+            "--latency-ms takes 0 to 1000, not {}",
+            args.latency_ms
+        ));
+    }
+    let code = baud::code(args.baud).ok_or_else(|| {
+        let rates: Vec<_> = baud::RATES.iter().map(u32::to_string).collect();
+        format!(
+            "--baud {} is no rate of these servos; there are {}",
+            args.baud,
+            rates.join(", ")
+        )
+    })?;
+    let mut line = Line::new(LineOptions {
+        paced: !args.unpaced,
+        latency: Duration::from_secs_f64(args.latency_ms * 1e-3),
+        seed: args.seed,
+        ..LineOptions::default()
+    });
+    let clock_start = crate::base::Time::ZERO;
+    for &(id, model) in servos {
+        if args.factory {
+            line.attach(id, Servo::factory(model));
+            line.set_plugged(id, servos.len() == 1, clock_start);
+        } else {
+            line.attach(id, Servo::commissioned(model, id, code));
+        }
+    }
+    for spec in &args.faults {
+        let fault: FaultSpec = spec.parse().map_err(|e| format!("{e}"))?;
+        line.inject(fault).map_err(|e| e.to_string())?;
+    }
+    Ok((line, if args.factory { 57_600 } else { args.baud }))
+}
+
+/// Reads `1-12[:MODEL][,20:MODEL...]`.
+fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Model)>, String> {
+    let mut servos: Vec<(u8, &'static Model)> = Vec::new();
+    for part in list.split(',') {
+        let (ids, name) = part.split_once(':').unwrap_or((part, MODELS[0].name));
+        let model = table::model(name).ok_or_else(|| {
+            let known = MODELS.iter().map(|model| model.name);
+            match nearest(name, known.clone()) {
+                Some(near) => format!("--servos: unknown model '{name}'; did you mean '{near}'?"),
+                None => {
+                    let known: Vec<_> = known.collect();
+                    let known = known.join(", ");
+                    format!("--servos: unknown model '{name}'; there are {known}")
+                }
+            }
+        })?;
+        let (first, last) = ids.split_once('-').unwrap_or((ids, ids));
+        let id = |text: &str| text.trim().parse().ok().filter(|id| *id <= MAX_ID);
+        let (Some(first), Some(last)) = (id(first), id(last)) else {
+            return Err(format!(
+                "--servos: '{ids}' is no id or range of ids 0..{MAX_ID}, as in 1-12 or 20"
+            ));
+        };
+        if first > last {
+            return Err(format!("--servos: the range '{ids}' runs backwards"));
+        }
+        for id in first..=last {
+            if servos.iter().any(|(other, _)| *other == id) {
+                return Err(format!("--servos: servo {id} is named twice"));
+            }
+            servos.push((id, model));
+        }
+    }
+    Ok(servos)
+}
+
+/// Takes `plug N` and `unplug N` from standard input until it ends.
+fn follow_plugs(line: &SharedLine, clock: &dyn Clock) {
+    for command in std::io::stdin().lock().lines().map_while(Result::ok) {
+        let words: Vec<&str> = command.split_whitespace().collect();
+        let plugged = match words.first() {
+            Some(&"plug") => true,
+            Some(&"unplug") => false,
+            None => continue,
+            Some(_) => {
+                eprintln!("expected 'plug N' or 'unplug N', found '{command}'");
+                continue;
+            }
+        };
+        let label = words.get(1).and_then(|word| word.parse().ok());
+        let found = label.is_some_and(|label| {
+            let now = clock.now();
+            line.lock().set_plugged(label, plugged, now)
+        });
+        if !found {
+            let labels: Vec<_> = line.lock().labels().map(|l| l.to_string()).collect();
+            eprintln!(
+                "no such servo in '{command}'; there are {}",
+                labels.join(", ")
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bad_list_of_servos_is_refused_with_a_reason() {
+        for (list, expected) in [
+            ("", "is no id"),
+            ("1-", "is no id"),
+            ("1-300", "is no id"),
+            ("253", "is no id"),
+            ("5-3", "runs backwards"),
+            ("1-3,2", "servo 2 is named twice"),
+            ("1:xl430-w25", "did you mean 'xl430-w250'?"),
+            ("1:frob", "there are xl430-w250"),
+        ] {
+            let message = parse_servos(list).expect_err("a bad list");
+            assert!(message.contains(expected), "{list}: {message}");
+        }
+    }
+
+    #[test]
+    fn ranges_and_single_servos_mix() {
+        let servos = parse_servos("1-3,20:XL430-W250").expect("a good list");
+        let ids: Vec<u8> = servos.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, [1, 2, 3, 20]);
+    }
+}

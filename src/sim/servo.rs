@@ -1,0 +1,557 @@
+//! One simulated servo: control table, motor, latched errors, bus watchdog, moved along by time alone.
+
+use super::motor::{Motor, Profile, SUBSTEP_NANOS};
+use super::table::{ControlTable, Model, TableError, addr};
+use crate::base::Time;
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+/// Radians of one position pulse.
+pub const PULSE_RAD: f64 = TAU / 4096.0;
+/// Radians per second of one velocity unit: 0.229 rev/min.
+pub const VELOCITY_UNIT_RAD_S: f64 = 0.229 * TAU / 60.0;
+/// Radians per second squared of one profile acceleration unit: 214.577 rev/min^2.
+pub const ACCELERATION_UNIT_RAD_S2: f64 = 214.577 * TAU / 3600.0;
+/// How long a servo is deaf and mute after a reboot.
+pub const BOOT_TIME: Duration = Duration::from_millis(250);
+
+/// Goal PWM at full duty.
+const FULL_PWM: f64 = 885.0;
+/// Position P Gain that makes one PWM unit per pulse of error.
+///
+/// The manual divides by 128; 100 makes up for the derivative gain, which is not modelled, and lets
+/// a servo at the default gain of 640 follow a steadily moving goal some 35 ms behind.
+const POSITION_P_DIVISOR: f64 = 100.0;
+/// Velocity error, as a share of the no-load speed, times this is duty in velocity mode.
+const VELOCITY_GAIN: f64 = 4.0;
+/// Pulses from the goal within which a servo counts as in position.
+const IN_POSITION_PULSES: f64 = 10.0;
+/// Pulses from the path beyond which Moving Status tells a following error.
+const FOLLOWING_ERROR_PULSES: f64 = 200.0;
+
+/// Bits of Hardware Error Status (70).
+pub mod hardware_error {
+    /// Input voltage out of range.
+    pub const VOLTAGE: u8 = 1 << 0;
+    /// Too hot.
+    pub const OVERHEATING: u8 = 1 << 2;
+    /// Motor encoder.
+    pub const ENCODER: u8 = 1 << 3;
+    /// Electrical shock or too little power.
+    pub const SHOCK: u8 = 1 << 4;
+    /// Overload.
+    pub const OVERLOAD: u8 = 1 << 5;
+}
+
+/// What injected faults do to a servo at present.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct Ailments {
+    /// Bits of Hardware Error Status that are raised while the fault lasts, and latched.
+    pub hardware_error: u8,
+    /// The shaft is blocked.
+    pub stuck: bool,
+    /// A tripped bus watchdog does not stop the motion.
+    pub watchdog_defect: bool,
+    /// Temperature that the servo reports, degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// Supply voltage that the servo reports, volts.
+    pub voltage_v: Option<f64>,
+}
+
+/// What the control loop needs of the table, taken over after each write.
+#[derive(Copy, Clone, Debug, Default)]
+struct Setpoint {
+    mode: u8,
+    torque_on: bool,
+    goal_rad: f64,
+    goal_rad_s: f64,
+    goal_duty: f64,
+    duty_limit: f64,
+    duty_per_rad: f64,
+    speed: Option<f64>,
+    acceleration: Option<f64>,
+    direction: f64,
+}
+
+/// A simulated servo.
+#[derive(Clone, Debug)]
+pub struct Servo {
+    pub(super) table: ControlTable,
+    pub(super) motor: Motor,
+    profile: Profile,
+    setpoint: Setpoint,
+    ailments: Ailments,
+    /// Substeps integrated so far, counted from time zero.
+    substep: i64,
+    booted_at: Time,
+    offline_until: Time,
+    fed_at: Time,
+    pub(super) held_write: Option<u16>,
+    pub(super) held_data: Vec<u8>,
+    pub(super) backup: Option<ControlTable>,
+}
+
+impl Servo {
+    /// A servo out of the box: id 1, 57,600 baud, return delay 500 us, torque off, position 2048.
+    pub fn factory(model: &'static Model) -> Self {
+        let mut table = ControlTable::new(model);
+        table.set(addr::FIRMWARE_VERSION, i64::from(model.firmware));
+        let mut servo = Self {
+            table,
+            motor: Motor::new(model.motor, 2048.0 * PULSE_RAD),
+            profile: Profile::default(),
+            setpoint: Setpoint::default(),
+            ailments: Ailments::default(),
+            substep: 0,
+            booted_at: Time::ZERO,
+            offline_until: Time::ZERO,
+            fed_at: Time::ZERO,
+            held_write: None,
+            held_data: Vec::with_capacity(256),
+            backup: None,
+        };
+        servo.boot();
+        servo
+    }
+
+    /// A servo as commissioned for a chain: `id`, the register value for its baud rate, no return delay.
+    pub fn commissioned(model: &'static Model, id: u8, baud_code: u8) -> Self {
+        let mut servo = Self::factory(model);
+        servo.table.set(addr::ID, i64::from(id));
+        servo.table.set(addr::BAUD_RATE, i64::from(baud_code));
+        servo.table.set(addr::RETURN_DELAY_TIME, 0);
+        servo
+    }
+
+    /// The same servo with another firmware version; before 45 an XL430 knows no fast reads.
+    pub fn with_firmware(mut self, version: u8) -> Self {
+        self.table.set(addr::FIRMWARE_VERSION, i64::from(version));
+        self
+    }
+
+    /// The same servo resting at `angle_rad` from pulse 2048, its goal there too.
+    pub fn with_angle(mut self, angle_rad: f64) -> Self {
+        self.motor.angle_rad = 2048.0 * PULSE_RAD + angle_rad;
+        let pulses = self.position_pulses().round() as i64;
+        self.table.set(addr::GOAL_POSITION, pulses);
+        self.take_setpoint();
+        self
+    }
+
+    /// Its id.
+    pub fn id(&self) -> u8 {
+        self.table.get(addr::ID) as u8
+    }
+
+    /// Whether torque is on.
+    pub fn torque_enabled(&self) -> bool {
+        self.setpoint.torque_on
+    }
+
+    /// Position in pulses, unrounded, as the register would show it.
+    pub fn position_pulses(&self) -> f64 {
+        self.to_pulses(self.motor.angle_rad)
+    }
+
+    /// Angle from pulse 2048, radians, in the register's direction.
+    pub fn angle_rad(&self) -> f64 {
+        (self.position_pulses() - 2048.0) * PULSE_RAD
+    }
+
+    /// Speed in the register's direction, rad/s.
+    pub fn speed_rad_s(&self) -> f64 {
+        self.motor.speed_rad_s * self.setpoint.direction
+    }
+
+    /// The value of a register as it stands, unsigned; 0 for an address without register.
+    pub fn register(&self, addr: u16) -> u32 {
+        self.table.get(addr)
+    }
+
+    /// Pushes the shaft with a torque from outside, N m, in the direction of growing pulses.
+    pub fn set_external_torque(&mut self, torque_nm: f64) {
+        self.motor.external_nm = torque_nm * self.setpoint.direction;
+    }
+
+    /// Whether it is up (not rebooting) at `now`.
+    pub fn is_online(&self, now: Time) -> bool {
+        now >= self.offline_until
+    }
+
+    /// Whether a hardware error is latched: the alert bit of every status.
+    pub fn alert(&self) -> bool {
+        self.table.get(addr::HARDWARE_ERROR_STATUS) != 0
+    }
+
+    /// Sets what faults do to it from now on.
+    pub fn set_ailments(&mut self, ailments: Ailments) {
+        self.ailments = ailments;
+        self.motor.blocked = ailments.stuck;
+        self.latch_errors();
+    }
+
+    /// Restarts at `now`: RAM back to defaults, torque off, errors cleared, mute for [`BOOT_TIME`].
+    pub fn reboot(&mut self, now: Time) {
+        self.boot();
+        self.booted_at = now;
+        self.offline_until = now + BOOT_TIME;
+    }
+
+    /// An instruction for whomsoever was heard on the bus: feeds the watchdog.
+    pub fn heard(&mut self, now: Time) {
+        self.fed_at = now;
+    }
+
+    /// Moves the servo on to `now`; earlier times change nothing.
+    pub fn advance(&mut self, now: Time) {
+        if let Some(expiry) = self.watchdog_expiry().filter(|&expiry| expiry <= now) {
+            self.integrate(expiry);
+            self.trip_watchdog();
+        }
+        self.integrate(now);
+    }
+
+    /// Brings the registers that show the present state up to date.
+    pub(super) fn refresh(&mut self, now: Time) {
+        let pulses = self.position_pulses();
+        let direction = self.setpoint.direction;
+        let speed = self.speed_rad_s() / VELOCITY_UNIT_RAD_S;
+        let path = self.to_pulses(self.profile.angle_rad);
+        let path_speed = self.profile.speed_rad_s * direction / VELOCITY_UNIT_RAD_S;
+        let positioning = self.setpoint.torque_on && self.is_positioning();
+        let on_the_way = positioning && !self.profile.arrived(self.setpoint.goal_rad);
+        let threshold = f64::from(self.table.get(addr::MOVING_THRESHOLD));
+        let moving = speed.abs() > threshold || on_the_way;
+        let goal = self.to_pulses(self.setpoint.goal_rad);
+        let mut status = 0;
+        if positioning && (goal - pulses).abs() <= IN_POSITION_PULSES {
+            status |= 1;
+        }
+        if on_the_way {
+            let shape = if self.setpoint.acceleration.is_some() {
+                3
+            } else {
+                1
+            };
+            status |= 1 << 1 | shape << 4;
+        }
+        if positioning && (path - pulses).abs() > FOLLOWING_ERROR_PULSES {
+            status |= 1 << 3;
+        }
+        let tick = now.saturating_since(self.booted_at).as_millis() % 32_768;
+        let voltage = self.ailments.voltage_v.unwrap_or(11.1);
+        let temperature = self.ailments.temperature_c.unwrap_or(32.0);
+        for (register, value) in [
+            (addr::REALTIME_TICK, tick as i64),
+            (addr::MOVING, i64::from(moving)),
+            (addr::MOVING_STATUS, status),
+            (
+                addr::PRESENT_PWM,
+                (self.motor.duty * direction * FULL_PWM).round() as i64,
+            ),
+            (
+                addr::PRESENT_LOAD,
+                (self.motor.effort() * direction * 1000.0).round() as i64,
+            ),
+            (addr::PRESENT_VELOCITY, speed.round() as i64),
+            (addr::PRESENT_POSITION, pulses.round() as i64),
+            (addr::VELOCITY_TRAJECTORY, path_speed.round() as i64),
+            (addr::POSITION_TRAJECTORY, path.round() as i64),
+            (addr::PRESENT_INPUT_VOLTAGE, (voltage * 10.0).round() as i64),
+            (addr::PRESENT_TEMPERATURE, temperature.round() as i64),
+            (addr::BACKUP_READY, i64::from(self.backup.is_some())),
+        ] {
+            self.table.set(register, value);
+        }
+    }
+
+    /// Takes a write that was checked: stores it and does what the registers in it cause.
+    pub(super) fn apply_write(&mut self, address: u16, data: &[u8]) {
+        let pulses = self.position_pulses();
+        let mode = self.table.get(addr::OPERATING_MODE);
+        let torque_on = self.setpoint.torque_on;
+        self.table.store(address, data);
+        let touched = |register: u16| {
+            (0..data.len()).any(|i| self.table.resolve(address + i as u16) == register)
+        };
+        let goal_written = touched(addr::GOAL_POSITION);
+        let mode_written = touched(addr::OPERATING_MODE);
+        if mode_written && self.table.get(addr::OPERATING_MODE) != mode {
+            self.change_mode();
+        }
+        if !torque_on && self.table.get(addr::TORQUE_ENABLE) != 0 {
+            if self.shut_down() {
+                // Latched until a reboot; the servo answers, and its torque stays off.
+                self.table.set(addr::TORQUE_ENABLE, 0);
+            } else {
+                self.profile.angle_rad = self.motor.angle_rad;
+                self.profile.speed_rad_s = 0.0;
+            }
+        }
+        self.take_setpoint();
+        if goal_written {
+            self.time_profile();
+        }
+        // Homing offset and direction change what is shown, not where the shaft is.
+        let shift = self.position_pulses() - pulses;
+        if shift != 0.0 && !goal_written {
+            let goal = i64::from(self.table.get_signed(addr::GOAL_POSITION));
+            self.table
+                .set(addr::GOAL_POSITION, goal + shift.round() as i64);
+            self.take_setpoint();
+        }
+    }
+
+    /// What the register's neighbours allow: limits, modes, the watchdog's lock.
+    pub(super) fn check_value(&self, register: u16, value: i64) -> Result<(), TableError> {
+        let limit = |addr| i64::from(self.table.get(addr));
+        let goal = matches!(
+            register,
+            addr::GOAL_PWM | addr::GOAL_VELOCITY | addr::GOAL_POSITION
+        );
+        if goal && self.watchdog_tripped() {
+            return Err(TableError::Range);
+        }
+        let within = match register {
+            addr::GOAL_PWM => value.abs() <= limit(addr::PWM_LIMIT),
+            addr::GOAL_VELOCITY => value.abs() <= limit(addr::VELOCITY_LIMIT),
+            addr::GOAL_POSITION => match self.table.get(addr::OPERATING_MODE) {
+                3 => {
+                    let allowed = limit(addr::MIN_POSITION_LIMIT)..=limit(addr::MAX_POSITION_LIMIT);
+                    allowed.contains(&value)
+                }
+                _ => value.abs() < 256 * 4096,
+            },
+            addr::OPERATING_MODE if !self.modes().contains(&(value as u8)) => {
+                return Err(TableError::Range);
+            }
+            _ => true,
+        };
+        if within {
+            Ok(())
+        } else {
+            Err(TableError::Limit)
+        }
+    }
+
+    /// Forgets full turns: the position comes back into 0..4095, apart from the homing offset.
+    pub(super) fn clear_turns(&mut self) {
+        self.motor.angle_rad = self.motor.angle_rad.rem_euclid(TAU);
+        self.profile.angle_rad = self.motor.angle_rad;
+        self.profile.speed_rad_s = 0.0;
+        let pulses = self.position_pulses().round() as i64;
+        self.table.set(addr::GOAL_POSITION, pulses);
+        self.take_setpoint();
+    }
+
+    /// Whether the shaft turns or is on its way.
+    pub(super) fn is_moving(&self) -> bool {
+        self.speed_rad_s().abs() / VELOCITY_UNIT_RAD_S
+            > f64::from(self.table.get(addr::MOVING_THRESHOLD))
+    }
+
+    fn modes(&self) -> &'static [u8] {
+        self.table.model().modes
+    }
+
+    fn boot(&mut self) {
+        let restore = self.table.get(addr::STARTUP_CONFIGURATION);
+        self.table.reset(|addr| addr >= super::table::RAM_START);
+        if restore & 2 != 0
+            && let Some(backup) = &self.backup
+        {
+            self.table.copy_from(backup, is_backed_up_ram);
+        }
+        self.held_write = None;
+        self.table.set(addr::TORQUE_ENABLE, i64::from(restore & 1));
+        self.table
+            .set(addr::GOAL_PWM, i64::from(self.table.get(addr::PWM_LIMIT)));
+        self.take_setpoint();
+        self.clear_turns();
+        self.latch_errors();
+    }
+
+    fn change_mode(&mut self) {
+        self.table
+            .reset(|a| (addr::VELOCITY_I_GAIN..=addr::FEEDFORWARD_1ST_GAIN).contains(&a));
+        self.table.set(addr::PROFILE_ACCELERATION, 0);
+        self.table.set(addr::PROFILE_VELOCITY, 0);
+        self.table.set(addr::GOAL_VELOCITY, 0);
+        self.table
+            .set(addr::GOAL_PWM, i64::from(self.table.get(addr::PWM_LIMIT)));
+        if self.table.get(addr::OPERATING_MODE) == 3 {
+            self.take_setpoint();
+            self.clear_turns();
+        } else {
+            let pulses = self.position_pulses().round() as i64;
+            self.table.set(addr::GOAL_POSITION, pulses);
+        }
+    }
+
+    fn take_setpoint(&mut self) {
+        let table = &self.table;
+        let unit = |addr, scale: f64| match table.get(addr) {
+            0 => None,
+            value => Some(f64::from(value) * scale),
+        };
+        let timed = table.get(addr::DRIVE_MODE) & 4 != 0;
+        let reverse = table.get(addr::DRIVE_MODE) & 1 != 0;
+        let goal_pwm = f64::from(table.get_signed(addr::GOAL_PWM));
+        let pwm_limit = f64::from(table.get(addr::PWM_LIMIT));
+        let direction = if reverse { -1.0 } else { 1.0 };
+        let gain = f64::from(table.get(addr::POSITION_P_GAIN));
+        let before = self.setpoint;
+        self.setpoint = Setpoint {
+            mode: table.get(addr::OPERATING_MODE) as u8,
+            torque_on: table.get(addr::TORQUE_ENABLE) != 0,
+            goal_rad: 0.0,
+            goal_rad_s: f64::from(table.get_signed(addr::GOAL_VELOCITY))
+                * VELOCITY_UNIT_RAD_S
+                * direction,
+            goal_duty: goal_pwm / FULL_PWM * direction,
+            duty_limit: goal_pwm.abs().min(pwm_limit) / FULL_PWM,
+            duty_per_rad: gain / POSITION_P_DIVISOR / PULSE_RAD / FULL_PWM,
+            // In time mode the limits follow from each goal's distance.
+            speed: match timed {
+                true => before.speed,
+                false => unit(addr::PROFILE_VELOCITY, VELOCITY_UNIT_RAD_S),
+            },
+            acceleration: match timed {
+                true => before.acceleration,
+                false => unit(addr::PROFILE_ACCELERATION, ACCELERATION_UNIT_RAD_S2),
+            },
+            direction,
+        };
+        self.setpoint.goal_rad =
+            self.to_angle(f64::from(self.table.get_signed(addr::GOAL_POSITION)));
+    }
+
+    /// Time-based profile: the limits that reach the new goal in the milliseconds of registers 112 and 108.
+    fn time_profile(&mut self) {
+        if self.table.get(addr::DRIVE_MODE) & 4 == 0 {
+            return;
+        }
+        let whole_s = f64::from(self.table.get(addr::PROFILE_VELOCITY)) * 1e-3;
+        let ramp_s =
+            (f64::from(self.table.get(addr::PROFILE_ACCELERATION)) * 1e-3).min(0.5 * whole_s);
+        let way = (self.setpoint.goal_rad - self.profile.angle_rad).abs();
+        let speed = (whole_s > 0.0 && way > 0.0).then(|| way / (whole_s - ramp_s));
+        self.setpoint.acceleration = speed.filter(|_| ramp_s > 0.0).map(|v| v / ramp_s);
+        self.setpoint.speed = speed;
+    }
+
+    fn to_pulses(&self, angle_rad: f64) -> f64 {
+        let offset = f64::from(self.table.get_signed(addr::HOMING_OFFSET));
+        2048.0 + (angle_rad / PULSE_RAD - 2048.0) * self.setpoint.direction + offset
+    }
+
+    fn to_angle(&self, pulses: f64) -> f64 {
+        let offset = f64::from(self.table.get_signed(addr::HOMING_OFFSET));
+        (2048.0 + (pulses - offset - 2048.0) * self.setpoint.direction) * PULSE_RAD
+    }
+
+    fn is_positioning(&self) -> bool {
+        matches!(self.setpoint.mode, 3 | 4)
+    }
+
+    fn shut_down(&self) -> bool {
+        self.table.get(addr::HARDWARE_ERROR_STATUS) & self.table.get(addr::SHUTDOWN) != 0
+    }
+
+    fn latch_errors(&mut self) {
+        let latched =
+            self.table.get(addr::HARDWARE_ERROR_STATUS) | u32::from(self.ailments.hardware_error);
+        self.table
+            .set(addr::HARDWARE_ERROR_STATUS, i64::from(latched));
+        if self.shut_down() {
+            self.table.set(addr::TORQUE_ENABLE, 0);
+            self.setpoint.torque_on = false;
+        }
+    }
+
+    fn watchdog_tripped(&self) -> bool {
+        self.table.get_signed(addr::BUS_WATCHDOG) == -1
+    }
+
+    fn watchdog_expiry(&self) -> Option<Time> {
+        let counts = self.table.get_signed(addr::BUS_WATCHDOG);
+        (self.setpoint.torque_on && counts > 0)
+            .then(|| self.fed_at + Duration::from_millis(20 * counts.unsigned_abs() as u64))
+    }
+
+    fn trip_watchdog(&mut self) {
+        self.table.set(addr::BUS_WATCHDOG, -1);
+        if self.ailments.watchdog_defect {
+            return;
+        }
+        let pulses = self.position_pulses().round() as i64;
+        self.table.set(addr::GOAL_POSITION, pulses);
+        self.table.set(addr::GOAL_VELOCITY, 0);
+        if self.setpoint.mode == 16 {
+            self.table.set(addr::GOAL_PWM, 0);
+        }
+        self.take_setpoint();
+        self.profile = Profile {
+            angle_rad: self.setpoint.goal_rad,
+            speed_rad_s: 0.0,
+        };
+    }
+
+    fn integrate(&mut self, now: Time) {
+        let target = now.nanos().div_euclid(SUBSTEP_NANOS);
+        while self.substep < target {
+            let settled = self.control();
+            self.motor.step(settled.duty);
+            self.substep += 1;
+            if settled.path_ended && self.motor.rests(settled.duty) {
+                // Nothing will change until the next write or fault.
+                self.substep = target;
+            }
+        }
+    }
+
+    /// Moves the path by one substep and computes the duty that follows it.
+    fn control(&mut self) -> Control {
+        let s = self.setpoint;
+        if !s.torque_on {
+            return Control {
+                duty: None,
+                path_ended: true,
+            };
+        }
+        let (duty, path_ended) = match s.mode {
+            1 => {
+                self.profile.step_speed(s.goal_rad_s, s.acceleration);
+                let full = self.motor.spec.no_load_rad_s;
+                let error = self.profile.speed_rad_s - self.motor.speed_rad_s;
+                let duty = (self.profile.speed_rad_s + VELOCITY_GAIN * error) / full;
+                (duty, self.profile.speed_rad_s == s.goal_rad_s)
+            }
+            16 => (s.goal_duty, true),
+            _ => {
+                self.profile.step(s.goal_rad, s.speed, s.acceleration);
+                let error = self.profile.angle_rad - self.motor.angle_rad;
+                (error * s.duty_per_rad, self.profile.arrived(s.goal_rad))
+            }
+        };
+        Control {
+            duty: Some(duty.clamp(-s.duty_limit, s.duty_limit)),
+            path_ended,
+        }
+    }
+}
+
+/// The RAM registers that a backup holds: gains and profile.
+pub(super) fn is_backed_up_ram(register: u16) -> bool {
+    matches!(
+        register,
+        addr::VELOCITY_I_GAIN
+            ..=addr::FEEDFORWARD_1ST_GAIN | addr::PROFILE_ACCELERATION | addr::PROFILE_VELOCITY
+    )
+}
+
+/// What the control loop decides in a substep.
+struct Control {
+    duty: Option<f64>,
+    path_ended: bool,
+}
