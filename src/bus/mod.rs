@@ -3,11 +3,15 @@
 //! [`port`] is the seam to the wire (serial port, simulated line), [`dynamixel`] speaks the
 //! protocol over it, [`ServoBus`] is all that the live loop knows.
 
+pub mod address;
 pub mod dynamixel;
 pub mod port;
+pub mod serial;
 
 use crate::base::JointState;
+pub use address::{AddressError, BusAddress, DynamixelBackend};
 pub use port::{Port, PortError};
+pub use serial::SerialPort;
 
 /// A chain of servos that takes one target and gives one state per joint and cycle.
 ///
@@ -41,6 +45,24 @@ pub trait ServoBus: Send {
     ///
     /// Safe to call in any state and more than once.
     fn torque_off(&mut self) -> Result<TorqueReport, BusError>;
+
+    /// Takes one servo that lost its torque back into control: goal at its present position,
+    /// torque on, from there ramped to its target by the following [`exchange`](Self::exchange) calls.
+    ///
+    /// Takes a few milliseconds of bus time. Fails while a hardware error is latched: reboot it first.
+    fn rearm(&mut self, joint: usize) -> Result<(), BusError>;
+
+    /// Restarts one servo, which clears a latched hardware error. Its torque is off afterwards.
+    ///
+    /// Returns at once; the servo is silent for about half a second, then shows up in
+    /// [`CycleReport::torqueless_mask`] and can be rearmed.
+    fn reboot(&mut self, joint: usize) -> Result<(), BusError>;
+
+    /// What [`prepare`](Self::prepare) found worth telling the user though it stops nothing, such
+    /// as a setting that costs bus time, with what to do.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
 }
 
 /// What one [`ServoBus::exchange`] saw.
@@ -54,6 +76,12 @@ pub struct CycleReport {
     pub silent_mask: u64,
     /// Bit per joint index (first 64): the servo's answer carried the alert flag (hardware error latched).
     pub alert_mask: u64,
+    /// Bit per joint index (first 64): the servo came back without torque (reboot, unplugged). It is
+    /// read and not driven until it is rearmed.
+    pub torqueless_mask: u64,
+    /// Bit per joint index (first 64): the servo was silent and is back; its goal is on the way from where
+    /// it was found to its target, at a bounded rate.
+    pub ramping_mask: u64,
     /// Damaged frames, wrong checksums and stray bytes seen.
     pub damaged: u16,
     /// Bytes sent and received, for the wire budget.

@@ -1,5 +1,6 @@
 //! The command line: one file per command, exit codes, messages.
 
+mod bus;
 mod failure;
 mod sim;
 
@@ -18,6 +19,7 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Bus(bus::BusArgs),
     /// Simulated servos for any client
     Sim(sim::SimArgs),
 }
@@ -27,6 +29,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome: Result<ExitStatus, Failure> = match cli.command {
         None => Ok(ExitStatus::Done),
+        Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),
     };
     match outcome {

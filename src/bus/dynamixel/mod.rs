@@ -1,1 +1,63 @@
 //! Dynamixel servos over Protocol 2.0.
+//!
+//! From the wire up: [`Master`] turns requests into frames on a [`Port`](super::Port) and waits no
+//! longer than the wire needs; [`Client`] is that seam, in registers and bytes, with the
+//! `dynamixel2` crate as a second implementation (feature `dxl-serial2`); [`model`] says
+//! what the registers mean; [`DynamixelChain`] is the [`ServoBus`](super::ServoBus) in joint angles.
+
+#[cfg(feature = "dxl-serial2")]
+pub mod backend_dynamixel2;
+pub mod chain;
+mod check;
+pub mod client;
+mod cycle;
+pub mod master;
+pub mod model;
+mod recovery;
+#[cfg(test)]
+mod scripted;
+pub mod servo;
+#[cfg(test)]
+mod tests;
+
+#[cfg(feature = "dxl-serial2")]
+pub use backend_dynamixel2::Dynamixel2Client;
+pub use chain::{ChainOptions, DynamixelChain};
+pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
+pub use master::{Master, MasterOptions};
+pub use model::{Model, Register};
+pub use servo::{Direction, ServoSpec, SpecError};
+
+use super::address::DynamixelBackend;
+use super::port::PortError;
+use super::serial::SerialPort;
+use crate::base::Clock;
+use std::sync::Arc;
+
+/// Opens a serial port and puts a client on it.
+///
+/// Where the adapter holds bytes back (see [`SerialPort::latency_timer`]), waits allow for it.
+/// Fails like [`SerialPort::open`], or when the backend is not built in.
+pub fn open(
+    path: &str,
+    baud: u32,
+    backend: DynamixelBackend,
+    clock: Arc<dyn Clock>,
+) -> Result<Box<dyn Client>, PortError> {
+    match backend {
+        DynamixelBackend::Handwave => {
+            let port = SerialPort::open(path, baud, clock)?;
+            let mut options = MasterOptions::default();
+            options.max_allowance += port.latency_timer().unwrap_or_default();
+            Ok(Box::new(Master::new(Box::new(port), options)))
+        }
+        #[cfg(feature = "dxl-serial2")]
+        DynamixelBackend::Dynamixel2 => Ok(Box::new(Dynamixel2Client::open(path, baud, clock)?)),
+        #[cfg(not(feature = "dxl-serial2"))]
+        DynamixelBackend::Dynamixel2 => Err(PortError::Open {
+            port: path.into(),
+            reason: "the dynamixel2 backend is not built in".into(),
+            advice: "Build with `--features dxl-serial2`, or leave backend=dynamixel2 out".into(),
+        }),
+    }
+}

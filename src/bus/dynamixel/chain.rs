@@ -1,0 +1,372 @@
+//! A chain of Dynamixel servos as a [`ServoBus`]: joint angles in, joint states out.
+//!
+//! The parts: `check` looks at everything before torque goes on, `cycle` is the control cycle,
+//! `recovery` brings servos back that were silent.
+
+use super::client::{Client, ClientError, Outcome};
+use super::model::{STATE_BYTES, address};
+use super::servo::{ServoSpec, SpecError};
+use crate::base::{JointState, Time};
+use crate::bus::{BusError, CycleReport, ServoBus, TorqueReport};
+use std::time::Duration;
+
+/// How often a request that brought no answer is repeated outside the control cycle.
+const TRIES: u32 = 3;
+
+/// Settings of a chain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainOptions {
+    /// The bus as written on the command line, for advice in messages.
+    pub bus: String,
+    /// Bus watchdog of the servos in counts of 20 ms: a servo that hears nothing for that long while
+    /// torque is on stops moving. 0 turns it off. Default 5 (100 ms).
+    pub watchdog: u8,
+    /// Profile velocity in counts of 0.229 rev/min, 0 for none. Default 0: the targets are smooth already.
+    pub profile_velocity: u32,
+    /// Profile acceleration in counts of 214.577 rev/min2, 0 for none. Default 0.
+    pub profile_acceleration: u32,
+    /// After how long without any answer the bus counts as lost. Default 500 ms.
+    pub lost_after: Duration,
+    /// How often a silent servo is asked again. Default 250 ms.
+    pub retry_every: Duration,
+    /// Bus time of a control cycle: within it the servos behind a silent one are asked a second time.
+    /// Default 5 ms.
+    pub cycle_budget: Duration,
+    /// How fast the goal of a servo that was silent moves back to its target, rad/s. Default 1.
+    pub reentry_rate_rad_s: f64,
+}
+
+impl Default for ChainOptions {
+    fn default() -> Self {
+        ChainOptions {
+            bus: String::new(),
+            watchdog: 5,
+            profile_velocity: 0,
+            profile_acceleration: 0,
+            lost_after: Duration::from_millis(500),
+            retry_every: Duration::from_millis(250),
+            cycle_budget: Duration::from_millis(5),
+            reentry_rate_rad_s: 1.0,
+        }
+    }
+}
+
+/// How the chain stands to one servo.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub(super) enum Link {
+    /// Read, not driven: torque was not turned on by us.
+    Resting,
+    /// Read and driven.
+    Driven,
+    /// Read and driven, its goal on the way back to the target.
+    Ramping,
+    /// Neither: it did not answer. Asked again at a low rate.
+    Silent,
+    /// Read, not driven: it was armed and came back without torque.
+    Torqueless,
+}
+
+/// One servo and what is known of it.
+#[derive(Debug)]
+pub(super) struct Servo {
+    pub(super) spec: ServoSpec,
+    pub(super) link: Link,
+    pub(super) firmware: u8,
+    /// Torque was turned on by us and not off again.
+    pub(super) armed: bool,
+    /// Last goal sent, in counts; fractions matter while ramping.
+    pub(super) goal_pulse: f64,
+    /// When a silent servo is asked again.
+    pub(super) retry_at: Time,
+    /// In this cycle: its state is new.
+    pub(super) fresh: bool,
+    /// In this cycle: it was its turn and nothing came.
+    pub(super) mute: bool,
+}
+
+/// Buffers of the cycle, allocated once.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    pub(super) ids: Vec<u8>,
+    pub(super) indices: Vec<usize>,
+    pub(super) data: Vec<u8>,
+    pub(super) outcomes: Vec<Outcome>,
+}
+
+/// A chain of servos on one line.
+pub struct DynamixelChain {
+    pub(super) client: Box<dyn Client>,
+    pub(super) options: ChainOptions,
+    pub(super) servos: Vec<Servo>,
+    pub(super) joints: Vec<String>,
+    pub(super) notes: Vec<String>,
+    pub(super) scratch: Scratch,
+    /// Fast reads are in use.
+    pub(super) fast: bool,
+    /// Cycles in a row in which a fast read brought nothing and an ordinary one did.
+    pub(super) fast_failures: u32,
+    /// The last fast read brought nothing, and no ordinary read has got through since.
+    pub(super) fast_in_doubt: bool,
+    /// The cycle before brought no answer at all.
+    pub(super) was_mute: bool,
+    pub(super) last_heard: Time,
+    pub(super) last_cycle: Option<Time>,
+}
+
+impl DynamixelChain {
+    /// A chain of the servos in `specs`, in the order of the joints, on the line of `client`.
+    pub fn new(
+        client: Box<dyn Client>,
+        specs: Vec<ServoSpec>,
+        options: ChainOptions,
+    ) -> Result<Self, SpecError> {
+        for (index, spec) in specs.iter().enumerate() {
+            spec.check()?;
+            if let Some(first) = specs[..index].iter().find(|other| other.id == spec.id) {
+                return Err(SpecError::DuplicateId {
+                    id: spec.id,
+                    first: first.joint.clone(),
+                    second: spec.joint.clone(),
+                });
+            }
+        }
+        let count = specs.len();
+        let now = client.now();
+        Ok(DynamixelChain {
+            joints: specs.iter().map(|spec| spec.joint.clone()).collect(),
+            servos: specs
+                .into_iter()
+                .map(|spec| Servo {
+                    goal_pulse: f64::from(spec.zero_pulse),
+                    spec,
+                    link: Link::Resting,
+                    firmware: 0,
+                    armed: false,
+                    retry_at: now,
+                    fresh: false,
+                    mute: false,
+                })
+                .collect(),
+            client,
+            options,
+            notes: Vec::new(),
+            scratch: Scratch {
+                ids: Vec::with_capacity(count),
+                indices: Vec::with_capacity(count),
+                data: vec![0; count * STATE_BYTES],
+                outcomes: vec![Outcome::NotReached; count],
+            },
+            fast: false,
+            fast_failures: 0,
+            fast_in_doubt: false,
+            was_mute: false,
+            last_heard: now,
+            last_cycle: None,
+        })
+    }
+
+    /// Whether the cycle uses fast sync reads. Decided by [`prepare`](ServoBus::prepare): all servos must have a
+    /// firmware that knows them; given up after five cycles in a row in which only an ordinary read got through.
+    pub fn uses_fast_reads(&self) -> bool {
+        self.fast
+    }
+
+    /// The client below, for its counters.
+    pub fn client(&self) -> &dyn Client {
+        &*self.client
+    }
+
+    /// Says what a failed request means for servo `index`.
+    pub(super) fn servo_error(&self, index: usize, error: ClientError) -> BusError {
+        let spec = &self.servos[index].spec;
+        match error {
+            ClientError::Port(error) => BusError::Port(error),
+            ClientError::Timeout { .. } => BusError::Absent {
+                id: spec.id,
+                joint: spec.joint.clone(),
+                port: self.client.port_name().into(),
+                baud: self.client.baud(),
+                bus: self.options.bus.clone(),
+            },
+            other => self.servo_problem(
+                index,
+                other.to_string(),
+                format!(
+                    "`handwave bus read {} {} all` shows its registers",
+                    self.options.bus, spec.id
+                ),
+            ),
+        }
+    }
+
+    pub(super) fn servo_problem(&self, index: usize, problem: String, advice: String) -> BusError {
+        let spec = &self.servos[index].spec;
+        BusError::Servo {
+            id: spec.id,
+            joint: spec.joint.clone(),
+            problem,
+            advice,
+        }
+    }
+
+    /// Repeats a request to servo `index` until it is answered, a few times at most.
+    pub(super) fn insist<T>(
+        &mut self,
+        index: usize,
+        mut request: impl FnMut(&mut dyn Client, u8) -> Result<T, ClientError>,
+    ) -> Result<T, BusError> {
+        let id = self.servos[index].spec.id;
+        let mut tries = 1;
+        loop {
+            match request(&mut *self.client, id) {
+                Ok(answer) => {
+                    self.last_heard = self.client.now();
+                    return Ok(answer);
+                }
+                Err(ClientError::Timeout { .. }) if tries < TRIES => tries += 1,
+                Err(error) => return Err(self.servo_error(index, error)),
+            }
+        }
+    }
+
+    pub(super) fn read_register<const N: usize>(
+        &mut self,
+        index: usize,
+        address: u16,
+    ) -> Result<[u8; N], BusError> {
+        let mut bytes = [0; N];
+        self.insist(index, |client, id| client.read(id, address, &mut bytes))?;
+        Ok(bytes)
+    }
+
+    pub(super) fn write_register(
+        &mut self,
+        index: usize,
+        address: u16,
+        bytes: &[u8],
+    ) -> Result<(), BusError> {
+        self.insist(index, |client, id| client.write(id, address, bytes))?;
+        Ok(())
+    }
+}
+
+impl ServoBus for DynamixelChain {
+    fn joints(&self) -> &[String] {
+        &self.joints
+    }
+
+    fn prepare(&mut self, states: &mut [JointState]) -> Result<(), BusError> {
+        self.check_all(states)
+    }
+
+    /// Makes the present position the goal of every servo, then turns torque on, reads it back and
+    /// starts the servos' bus watchdogs: from here on [`exchange`](ServoBus::exchange) must be called
+    /// more often than the watchdog time.
+    fn arm(&mut self) -> Result<(), BusError> {
+        let armed = (0..self.servos.len()).try_for_each(|index| self.arm_servo(index));
+        // Watchdogs last: while servos are still being set up one by one, none should run.
+        let armed = armed
+            .and_then(|()| (0..self.servos.len()).try_for_each(|index| self.start_watchdog(index)));
+        if armed.is_err() {
+            // Better limp than half awake. The first error is the one to tell.
+            let _ = self.torque_off();
+        }
+        // The watchdogs run from here on, see `watchdogs_may_have_tripped`.
+        self.last_cycle = Some(self.client.now());
+        armed
+    }
+
+    fn exchange(
+        &mut self,
+        targets_rad: &[f64],
+        states: &mut [JointState],
+    ) -> Result<CycleReport, BusError> {
+        self.cycle(targets_rad, states)
+    }
+
+    fn torque_off(&mut self) -> Result<TorqueReport, BusError> {
+        let mut reasons: Vec<Option<String>> =
+            vec![Some("not asked".to_owned()); self.servos.len()];
+        for _ in 0..TRIES {
+            self.scratch.ids.clear();
+            for (servo, reason) in self.servos.iter().zip(&reasons) {
+                if reason.is_some() {
+                    self.scratch.ids.push(servo.spec.id);
+                }
+            }
+            if self.scratch.ids.is_empty() {
+                break;
+            }
+            // One byte of zero each: torque off, then the watchdog, which has nothing left to guard.
+            let zeros = vec![0; self.scratch.ids.len()];
+            for register in [address::TORQUE_ENABLE, address::BUS_WATCHDOG] {
+                let sent = self
+                    .client
+                    .sync_write(register, 1, &self.scratch.ids, &zeros);
+                // Sync writes are not answered: nothing else than a lost port can be learnt here.
+                if let Err(ClientError::Port(error)) = sent {
+                    return Err(error.into());
+                }
+            }
+            for (servo, reason) in self.servos.iter_mut().zip(&mut reasons) {
+                if reason.is_none() {
+                    continue;
+                }
+                let mut torque = [1];
+                let answer = self
+                    .client
+                    .read(servo.spec.id, address::TORQUE_ENABLE, &mut torque);
+                *reason = match answer {
+                    Ok(_) if torque == [0] => None,
+                    Ok(_) => Some("its torque stays on".into()),
+                    Err(ClientError::Port(error)) => return Err(error.into()),
+                    Err(ClientError::Timeout { .. }) => Some("it does not answer".into()),
+                    Err(error) => Some(error.to_string()),
+                };
+            }
+        }
+        let mut report = TorqueReport::default();
+        for (servo, reason) in self.servos.iter_mut().zip(reasons) {
+            servo.armed = false;
+            if servo.link != Link::Silent {
+                servo.link = Link::Resting;
+            }
+            match reason {
+                None => report.confirmed_off.push(servo.spec.joint.clone()),
+                Some(reason) => report.unconfirmed.push((servo.spec.joint.clone(), reason)),
+            }
+        }
+        Ok(report)
+    }
+
+    fn rearm(&mut self, joint: usize) -> Result<(), BusError> {
+        if joint >= self.servos.len() {
+            return Ok(());
+        }
+        self.arm_servo(joint)?;
+        self.start_watchdog(joint)?;
+        self.servos[joint].link = Link::Ramping;
+        Ok(())
+    }
+
+    fn reboot(&mut self, joint: usize) -> Result<(), BusError> {
+        let Some(servo) = self.servos.get(joint) else {
+            return Ok(());
+        };
+        let id = servo.spec.id;
+        match self.client.reboot(id) {
+            // It may be too deep in trouble to answer and reboot all the same.
+            Ok(_) | Err(ClientError::Timeout { .. }) => {}
+            Err(error) => return Err(self.servo_error(joint, error)),
+        }
+        let now = self.client.now();
+        let servo = &mut self.servos[joint];
+        servo.link = Link::Silent;
+        servo.retry_at = now + self.options.retry_every;
+        Ok(())
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}

@@ -1,0 +1,269 @@
+//! What is looked at before a servo may move, and the way to torque.
+
+use super::chain::{DynamixelChain, Link};
+use super::client::ClientError;
+use super::model::{HARDWARE_ERRORS, Model, POSITION_MODE, STATE_BYTES, address};
+use super::servo::position_pulse;
+use crate::base::JointState;
+use crate::bus::BusError;
+use handwave_dynamixel::wire;
+
+/// Drive mode bits that change what goals mean: reverse (0) and time-based profile (2).
+const DRIVE_MODE_FOREIGN: u8 = 0b101;
+/// Drive mode bit 3: a goal turns torque on.
+const TORQUE_ON_BY_GOAL: u8 = 0b1000;
+
+impl DynamixelChain {
+    /// Looks at every servo and reads all present states; changes no torque and no EEPROM.
+    pub(super) fn check_all(&mut self, states: &mut [JointState]) -> Result<(), BusError> {
+        self.notes.clear();
+        let mut return_delay = 0;
+        let mut slow = 0;
+        for (index, state) in (0..self.servos.len()).zip(states) {
+            let delay = self.check_servo(index, state)?;
+            slow += usize::from(delay > 0);
+            return_delay = return_delay.max(delay);
+        }
+        self.client
+            .set_return_delay(wire::return_delay(return_delay));
+        if slow > 0 {
+            self.notes.push(format!(
+                "{slow} servo(s) wait up to {} us before each answer (return_delay_time {return_delay}), \
+                 which costs bus time in every cycle. With torque off set it to 0: \
+                 `handwave bus write {} ID return_delay_time 0`",
+                2 * u32::from(return_delay),
+                self.options.bus
+            ));
+        }
+        self.fast = self
+            .servos
+            .iter()
+            .all(|servo| servo.firmware >= servo.spec.model.fast_reads_since);
+        if let Some(old) = self
+            .servos
+            .iter()
+            .find(|servo| servo.firmware < servo.spec.model.fast_reads_since)
+        {
+            self.notes.push(format!(
+                "servo {} has firmware {}, fast reads need {}: ordinary sync reads are used",
+                old.spec.id, old.firmware, old.spec.model.fast_reads_since
+            ));
+        }
+        self.fast_failures = 0;
+        self.fast_in_doubt = false;
+        Ok(())
+    }
+
+    /// Checks one servo and returns its return delay register.
+    fn check_servo(&mut self, index: usize, state: &mut JointState) -> Result<u8, BusError> {
+        let bus = self.options.bus.clone();
+        let spec = self.servos[index].spec.clone();
+        let id = spec.id;
+        let ping = self.insist(index, |client, id| client.ping(id))?;
+        if ping.model != spec.model.number {
+            let found = Model::by_number(ping.model)
+                .map_or_else(|| "an unknown model".into(), |model| model.name.to_owned());
+            return Err(self.servo_problem(
+                index,
+                format!(
+                    "it is {found} (model number {}), the configuration says {} ({})",
+                    ping.model, spec.model.name, spec.model.number
+                ),
+                "Correct the model in the configuration, or check the ids of the chain".into(),
+            ));
+        }
+        self.servos[index].firmware = ping.firmware;
+        self.ensure_answers(index)?;
+
+        let [errors] = self.read_register(index, address::HARDWARE_ERROR)?;
+        if errors != 0 {
+            return Err(self.hardware_error(index, errors));
+        }
+        let [delay, drive_mode, mode] = self.read_register(index, address::RETURN_DELAY)?;
+        if mode != POSITION_MODE {
+            return Err(self.servo_problem(
+                index,
+                format!("operating mode is {mode}, needed is {POSITION_MODE} (position)"),
+                format!(
+                    "With torque off set it by `handwave bus write {bus} {id} operating_mode {POSITION_MODE}`"
+                ),
+            ));
+        }
+        if drive_mode & DRIVE_MODE_FOREIGN != 0 {
+            return Err(self.servo_problem(
+                index,
+                format!(
+                    "drive mode is {drive_mode}: reverse direction (bit 0) and time-based profile \
+                     (bit 2) must be off, the configuration's direction does that work"
+                ),
+                format!(
+                    "With torque off set it by `handwave bus write {bus} {id} drive_mode {}`",
+                    drive_mode & !DRIVE_MODE_FOREIGN
+                ),
+            ));
+        }
+        if drive_mode & TORQUE_ON_BY_GOAL != 0 {
+            self.notes.push(format!(
+                "servo {id} turns torque on by itself when it gets a goal (drive_mode bit 3)"
+            ));
+        }
+        self.check_limits(index)?;
+        let [watchdog] = self.read_register(index, address::BUS_WATCHDOG)?;
+        if watchdog != 0 {
+            // Left running or tripped by whoever used the chain before; tripped, it refuses goals.
+            self.write_register(index, address::BUS_WATCHDOG, &[0])?;
+        }
+
+        let registers: [u8; STATE_BYTES] = self.read_register(index, address::PRESENT_STATE)?;
+        let pulse = position_pulse(&registers);
+        self.check_position(index, pulse)?;
+        let servo = &mut self.servos[index];
+        servo.goal_pulse = f64::from(pulse);
+        servo.link = Link::Resting;
+        *state = servo.spec.state(&registers, self.client.now());
+        Ok(delay)
+    }
+
+    /// Sees to it that the servo answers reads and writes (status return level 2, in RAM).
+    fn ensure_answers(&mut self, index: usize) -> Result<(), BusError> {
+        let id = self.servos[index].spec.id;
+        let mut level = [0];
+        match self
+            .client
+            .read(id, address::STATUS_RETURN_LEVEL, &mut level)
+        {
+            Ok(_) if level == [2] => return Ok(()),
+            // At level 0 not even a read is answered, though the ping was.
+            Ok(_) | Err(ClientError::Timeout { .. }) => {}
+            Err(error) => return Err(self.servo_error(index, error)),
+        }
+        // A sync write never expects an answer.
+        self.client
+            .sync_write(address::STATUS_RETURN_LEVEL, 1, &[id], &[2])
+            .map_err(|error| self.servo_error(index, error))?;
+        let [level] = self.read_register(index, address::STATUS_RETURN_LEVEL)?;
+        if level != 2 {
+            return Err(self.servo_problem(
+                index,
+                format!("status return level stays {level}, needed is 2"),
+                "Reboot the servo and try again".into(),
+            ));
+        }
+        Ok(())
+    }
+
+    /// The declared range must lie within the servo's own limits, or it would drop goals without a word.
+    fn check_limits(&mut self, index: usize) -> Result<(), BusError> {
+        let bytes: [u8; 8] = self.read_register(index, address::MAX_POSITION_LIMIT)?;
+        let [a, b, c, d, e, f, g, h] = bytes;
+        let max = i32::from_le_bytes([a, b, c, d]);
+        let min = i32::from_le_bytes([e, f, g, h]);
+        let spec = &self.servos[index].spec;
+        if min <= spec.min_pulse && spec.max_pulse <= max {
+            return Ok(());
+        }
+        let (id, bus) = (spec.id, &self.options.bus);
+        Err(self.servo_problem(
+            index,
+            format!(
+                "its position limits are {min} to {max}, the configuration wants {} to {}; \
+                 it would ignore goals outside its limits",
+                spec.min_pulse, spec.max_pulse
+            ),
+            format!(
+                "Narrow the configured range, or with torque off widen the limits: \
+                 `handwave bus write {bus} {id} min_position_limit {}`, \
+                 `handwave bus write {bus} {id} max_position_limit {}`",
+                spec.min_pulse, spec.max_pulse
+            ),
+        ))
+    }
+
+    fn check_position(&self, index: usize, pulse: i32) -> Result<(), BusError> {
+        let spec = &self.servos[index].spec;
+        if spec.contains(pulse) {
+            return Ok(());
+        }
+        Err(self.servo_problem(
+            index,
+            format!(
+                "it stands at {pulse} ({:.1} deg), outside its declared range {} to {}",
+                spec.position_rad(pulse).to_degrees(),
+                spec.min_pulse,
+                spec.max_pulse
+            ),
+            "Turn the joint into its range by hand (torque is off), \
+             or check zero, direction and range in the configuration"
+                .into(),
+        ))
+    }
+
+    /// Says which hardware errors are latched and how to get rid of them.
+    pub(super) fn hardware_error(&self, index: usize, errors: u8) -> BusError {
+        let names: Vec<&str> = HARDWARE_ERRORS
+            .iter()
+            .filter(|(bit, _)| errors & (1 << bit) != 0)
+            .map(|(_, name)| *name)
+            .collect();
+        let what = if names.is_empty() {
+            "unknown".into()
+        } else {
+            names.join(", ")
+        };
+        self.servo_problem(
+            index,
+            format!("hardware error latched: {what} (register 70 = {errors:#04x})"),
+            format!(
+                "Remove the cause, then `handwave bus reboot {} {}`",
+                self.options.bus, self.servos[index].spec.id
+            ),
+        )
+    }
+
+    /// Goal := present position, torque on and read back, for one servo.
+    pub(super) fn arm_servo(&mut self, index: usize) -> Result<(), BusError> {
+        let [errors] = self.read_register(index, address::HARDWARE_ERROR)?;
+        if errors != 0 {
+            return Err(self.hardware_error(index, errors));
+        }
+        // A tripped watchdog refuses goals.
+        self.write_register(index, address::BUS_WATCHDOG, &[0])?;
+        let mut profile = [0; 8];
+        profile[..4].copy_from_slice(&self.options.profile_acceleration.to_le_bytes());
+        profile[4..].copy_from_slice(&self.options.profile_velocity.to_le_bytes());
+        self.write_register(index, address::PROFILE_ACCELERATION, &profile)?;
+        let pulse = i32::from_le_bytes(self.read_register(index, address::PRESENT_POSITION)?);
+        self.check_position(index, pulse)?;
+        self.write_register(index, address::GOAL_POSITION, &pulse.to_le_bytes())?;
+        // From here on torque may be on, whatever the answers say.
+        self.servos[index].armed = true;
+        self.write_register(index, address::TORQUE_ENABLE, &[1])?;
+        let [torque] = self.read_register(index, address::TORQUE_ENABLE)?;
+        if torque != 1 {
+            return Err(self.servo_problem(
+                index,
+                format!("torque does not come on (torque_enable reads {torque})"),
+                format!(
+                    "Check its supply, then `handwave bus reboot {} {}`",
+                    self.options.bus, self.servos[index].spec.id
+                ),
+            ));
+        }
+        let servo = &mut self.servos[index];
+        servo.goal_pulse = f64::from(pulse);
+        servo.link = Link::Driven;
+        Ok(())
+    }
+
+    /// Starts the watchdog of one servo where it is wanted and there is one. Only with torque on: it counts then only.
+    pub(super) fn start_watchdog(&mut self, index: usize) -> Result<(), BusError> {
+        let servo = &self.servos[index];
+        let known = servo.firmware >= servo.spec.model.watchdog_since;
+        // The register is signed; -1 means tripped.
+        let counts = self.options.watchdog.min(127);
+        if counts == 0 || !known {
+            return Ok(());
+        }
+        self.write_register(index, address::BUS_WATCHDOG, &[counts])
+    }
+}

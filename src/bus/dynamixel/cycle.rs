@@ -1,0 +1,281 @@
+//! The control cycle: goals out, states in, and what is done about servos that do not answer.
+
+use super::chain::{DynamixelChain, Link};
+use super::client::{ClientError, Outcome};
+use super::model::{STATE_BYTES, address};
+use crate::base::{JointState, Time};
+use crate::bus::{BusError, CycleReport};
+use handwave_dynamixel::wire;
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+/// Cycles in a row after which fast reads are given up.
+const FAST_FAILURES: u32 = 5;
+/// How often servos are asked in one cycle: at first, and again for what damage or silence took along.
+const MAX_ROUNDS: u32 = 3;
+/// The longest step of time that moves a ramped goal.
+const MAX_STEP: Duration = Duration::from_millis(50);
+
+/// The bit of joint `index` in a report; none beyond the first 64.
+pub(super) fn bit(index: usize) -> u64 {
+    u32::try_from(index)
+        .ok()
+        .and_then(|index| 1u64.checked_shl(index))
+        .unwrap_or(0)
+}
+
+impl DynamixelChain {
+    pub(super) fn cycle(
+        &mut self,
+        targets_rad: &[f64],
+        states: &mut [JointState],
+    ) -> Result<CycleReport, BusError> {
+        let begin = self.client.now();
+        let before = self.client.traffic();
+        let mut report = CycleReport::default();
+        if self.watchdogs_may_have_tripped(begin) {
+            self.revive_all()?;
+        }
+        let step = self.last_cycle.map_or(Duration::ZERO, |last| {
+            begin.saturating_since(last).min(MAX_STEP)
+        });
+        if self
+            .last_cycle
+            .is_none_or(|last| begin.saturating_since(last) >= self.options.lost_after)
+        {
+            // Silence counts only while somebody asks.
+            self.last_heard = begin;
+        }
+        self.last_cycle = Some(begin);
+
+        self.send_goals(targets_rad, step.as_secs_f64())?;
+        report.goal_sent_us = micros(self.client.now().saturating_since(begin));
+        self.read_states(states, &mut report, begin)?;
+        self.retry_one(begin)?;
+
+        let now = self.client.now();
+        if report.fresh > 0 {
+            self.last_heard = now;
+        }
+        self.was_mute = report.fresh == 0;
+        for (index, servo) in self.servos.iter().enumerate() {
+            match servo.link {
+                Link::Torqueless => report.torqueless_mask |= bit(index),
+                Link::Ramping => report.ramping_mask |= bit(index),
+                Link::Silent | Link::Driven | Link::Resting => {}
+            }
+        }
+        let after = self.client.traffic();
+        let bytes = (after.sent - before.sent) + (after.received - before.received);
+        report.bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
+        report.damaged = u16::try_from(after.damaged - before.damaged).unwrap_or(u16::MAX);
+        report.cycle_us = micros(now.saturating_since(begin));
+
+        let silence = now.saturating_since(self.last_heard);
+        if report.fresh == 0 && silence >= self.options.lost_after && !self.servos.is_empty() {
+            return Err(BusError::Lost {
+                port: self.client.port_name().into(),
+                silence_ms: u32::try_from(silence.as_millis()).unwrap_or(u32::MAX),
+            });
+        }
+        Ok(report)
+    }
+
+    /// Sends the goals of all servos that are driven.
+    fn send_goals(&mut self, targets_rad: &[f64], step_s: f64) -> Result<(), BusError> {
+        let scratch = &mut self.scratch;
+        scratch.ids.clear();
+        let mut filled = 0;
+        for (servo, &target_rad) in self.servos.iter_mut().zip(targets_rad) {
+            if !matches!(servo.link, Link::Driven | Link::Ramping) {
+                continue;
+            }
+            // Not a number: the last goal stands.
+            let wanted = servo
+                .spec
+                .goal_pulse(target_rad)
+                .map_or(servo.goal_pulse, f64::from);
+            servo.goal_pulse = if servo.link == Link::Ramping {
+                let rate = self.options.reentry_rate_rad_s * servo.spec.model.pulses_per_turn / TAU;
+                let reach = rate.max(0.0) * step_s;
+                let left = wanted - servo.goal_pulse;
+                if left.abs() <= reach {
+                    servo.link = Link::Driven;
+                    wanted
+                } else {
+                    servo.goal_pulse + reach.copysign(left)
+                }
+            } else {
+                wanted
+            };
+            let pulse =
+                (servo.goal_pulse.round() as i32).clamp(servo.spec.min_pulse, servo.spec.max_pulse);
+            scratch.ids.push(servo.spec.id);
+            scratch.data[filled..filled + 4].copy_from_slice(&pulse.to_le_bytes());
+            filled += 4;
+        }
+        if scratch.ids.is_empty() {
+            return Ok(());
+        }
+        self.client
+            .sync_write(
+                address::GOAL_POSITION,
+                4,
+                &scratch.ids,
+                &scratch.data[..filled],
+            )
+            .map_err(port_error)
+    }
+
+    /// Reads all servos that are not silent; asks again for what a silent or damaged one took with it.
+    fn read_states(
+        &mut self,
+        states: &mut [JointState],
+        report: &mut CycleReport,
+        begin: Time,
+    ) -> Result<(), BusError> {
+        self.scratch.ids.clear();
+        self.scratch.indices.clear();
+        for (index, servo) in self.servos.iter().enumerate() {
+            if servo.link != Link::Silent {
+                self.scratch.ids.push(servo.spec.id);
+                self.scratch.indices.push(index);
+            }
+        }
+        for servo in &mut self.servos {
+            (servo.fresh, servo.mute) = (false, false);
+        }
+        // While fast reads are in doubt, an ordinary one shows who is to blame: they or the line.
+        let mut fast = self.fast && !self.fast_in_doubt;
+        let mut fast_was_mute = false;
+        for round in 0..MAX_ROUNDS {
+            let count = self.scratch.ids.len();
+            let answer = if fast {
+                wire::fast_status(count, STATE_BYTES)
+            } else {
+                count * wire::status(STATE_BYTES)
+            };
+            let needed = wire::duration(wire::sync_read(count) + answer, self.client.baud());
+            let spent = self.client.now().saturating_since(begin);
+            let room = spent + needed <= self.options.cycle_budget;
+            if count == 0 || (round > 0 && !room) {
+                break;
+            }
+            self.read_listed(fast)?;
+            self.take_states(states, report);
+            if fast && report.fresh == 0 && self.servos.iter().any(|servo| servo.mute) {
+                // Not even the first servo spoke: it is silent, or fast reads are not understood.
+                fast_was_mute = true;
+                fast = false;
+            }
+        }
+        self.judge_fast_reads(fast_was_mute, report.fresh);
+        self.leave_out_mute(report.fresh);
+        for (index, servo) in self.servos.iter().enumerate() {
+            if !servo.fresh {
+                report.silent = report.silent.saturating_add(1);
+                report.silent_mask |= bit(index);
+            }
+        }
+        Ok(())
+    }
+
+    fn read_listed(&mut self, fast: bool) -> Result<(), BusError> {
+        let count = self.scratch.ids.len();
+        let scratch = &mut self.scratch;
+        let data = &mut scratch.data[..count * STATE_BYTES];
+        let outcomes = &mut scratch.outcomes[..count];
+        let (address, length) = (address::PRESENT_STATE, STATE_BYTES as u16);
+        let read = if fast {
+            self.client
+                .fast_sync_read(address, length, &scratch.ids, data, outcomes)
+        } else {
+            self.client
+                .sync_read(address, length, &scratch.ids, data, outcomes)
+        };
+        read.map_err(port_error)
+    }
+
+    /// Moves what is fresh into `states` and keeps in the list who can be asked again.
+    fn take_states(&mut self, states: &mut [JointState], report: &mut CycleReport) {
+        let now = self.client.now();
+        let scratch = &mut self.scratch;
+        let mut kept = 0;
+        for place in 0..scratch.ids.len() {
+            let index = scratch.indices[place];
+            match scratch.outcomes[place] {
+                Outcome::Fresh(reply) => {
+                    let begin = place * STATE_BYTES;
+                    if let Some((registers, state)) = scratch.data[begin..]
+                        .first_chunk::<STATE_BYTES>()
+                        .zip(states.get_mut(index))
+                    {
+                        *state = self.servos[index].spec.state(registers, now);
+                    }
+                    self.servos[index].fresh = true;
+                    report.fresh = report.fresh.saturating_add(1);
+                    if reply.alert {
+                        report.alert_mask |= bit(index);
+                    }
+                }
+                Outcome::Silent => self.servos[index].mute = true,
+                // It is there; asking again brings the same answer.
+                Outcome::Refused(_) => {}
+                Outcome::Damaged | Outcome::NotReached => {
+                    scratch.ids[kept] = scratch.ids[place];
+                    scratch.indices[kept] = index;
+                    kept += 1;
+                }
+            }
+        }
+        scratch.ids.truncate(kept);
+        scratch.indices.truncate(kept);
+    }
+
+    /// Gives fast reads up when time and again only ordinary reads get through.
+    fn judge_fast_reads(&mut self, fast_was_mute: bool, fresh: u16) {
+        if !self.fast {
+            return;
+        }
+        let ordinary_got_through = fresh > 0 && (fast_was_mute || self.fast_in_doubt);
+        if ordinary_got_through {
+            self.fast_failures += 1;
+            self.fast = self.fast_failures < FAST_FAILURES;
+        } else if fresh > 0 {
+            self.fast_failures = 0;
+        }
+        self.fast_in_doubt = fresh == 0 && (fast_was_mute || self.fast_in_doubt);
+    }
+
+    /// Takes servos that were mute out of the following cycles.
+    ///
+    /// If nobody at all answered, the line may have hiccuped: then only in the second such cycle.
+    fn leave_out_mute(&mut self, fresh: u16) {
+        if fresh == 0 && !self.was_mute {
+            return;
+        }
+        let now = self.client.now();
+        for servo in self.servos.iter_mut().filter(|servo| servo.mute) {
+            servo.link = Link::Silent;
+            // The first time at once: a single lost answer should not cost a quarter of a second.
+            servo.retry_at = now;
+        }
+    }
+}
+
+/// In the cycle the only failure of a request to many is the port's.
+fn port_error(error: ClientError) -> BusError {
+    match error {
+        ClientError::Port(error) => BusError::Port(error),
+        other => BusError::Servo {
+            id: handwave_dynamixel::BROADCAST_ID,
+            joint: String::new(),
+            problem: other.to_string(),
+            advice: "Split the chain over two buses".into(),
+        },
+    }
+}
+
+fn micros(span: Duration) -> u32 {
+    u32::try_from(span.as_micros()).unwrap_or(u32::MAX)
+}

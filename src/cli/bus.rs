@@ -1,0 +1,118 @@
+//! `handwave bus`: look at and set up the servos of a bus.
+
+mod ids;
+mod registers;
+mod scan;
+
+use super::{ExitStatus, Failure};
+use crate::bus::dynamixel::{self, Client, ClientError, Model};
+use crate::bus::{AddressError, BusAddress};
+use crate::live::RealClock;
+use clap::{Args, Subcommand};
+use ids::IdList;
+use std::io::{self, Write};
+use std::sync::Arc;
+
+/// Look at and set up the servos of a bus.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+BUS is `dynamixel:PORT[@BAUD]`, 1000000 baud if none is given.
+
+Examples:
+  handwave bus scan dynamixel:/dev/ttyUSB0 --baud all
+  handwave bus ping dynamixel:/dev/ttyUSB0 3
+  handwave bus read dynamixel:/dev/ttyUSB0 1-12 present_position
+  handwave bus read dynamixel:/dev/ttyUSB0 3 all
+  handwave bus write dynamixel:/dev/ttyUSB0@57600 1 baud_rate 3
+  handwave bus reboot dynamixel:/dev/ttyUSB0 3")]
+pub struct BusArgs {
+    #[command(subcommand)]
+    command: BusCommand,
+}
+
+#[derive(Subcommand, Debug)]
+enum BusCommand {
+    Scan(scan::ScanArgs),
+    Ping(scan::PingArgs),
+    Read(registers::ReadArgs),
+    Write(registers::WriteArgs),
+    Reboot(RebootArgs),
+}
+
+/// Restart servos: clears a latched hardware error; torque is off afterwards.
+#[derive(Args, Debug)]
+struct RebootArgs {
+    /// The bus, such as dynamixel:/dev/ttyUSB0@1000000.
+    #[arg(value_name = "BUS")]
+    bus: BusAddress,
+    /// Servo ids, such as 3, 1,3,5 or 1-12.
+    #[arg(value_name = "IDS")]
+    ids: IdList,
+}
+
+/// Runs `handwave bus`.
+pub fn run(args: BusArgs) -> Result<ExitStatus, Failure> {
+    let mut out = io::stdout().lock();
+    match args.command {
+        BusCommand::Scan(args) => scan::scan(&args, &mut out),
+        BusCommand::Ping(args) => scan::ping(&args, &mut out),
+        BusCommand::Read(args) => registers::read(&args, &mut out),
+        BusCommand::Write(args) => registers::write(&args, &mut out),
+        BusCommand::Reboot(args) => reboot(&args, &mut out),
+    }
+}
+
+fn reboot(args: &RebootArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure> {
+    let mut client = open(&args.bus)?;
+    for id in args.ids.iter() {
+        client.reboot(id)?;
+        say(out, format_args!("servo {id} reboots, its torque is off"))?;
+    }
+    Ok(ExitStatus::Done)
+}
+
+/// A client on the bus.
+fn open(bus: &BusAddress) -> Result<Box<dyn Client>, Failure> {
+    match bus {
+        BusAddress::Sim => Err(Failure::input(
+            "the bus `sim` lives inside `handwave run`. For servos that other commands can reach start \
+             `handwave sim dynamixel --servos 1-12 --link /tmp/servos` and use dynamixel:/tmp/servos",
+        )),
+        BusAddress::Dynamixel {
+            path,
+            baud,
+            backend,
+        } => {
+            dynamixel::open(path, *baud, *backend, Arc::new(RealClock::new())).map_err(Failure::bus)
+        }
+    }
+}
+
+impl From<ClientError> for Failure {
+    fn from(error: ClientError) -> Self {
+        match error {
+            ClientError::Timeout { id, .. } => Failure::bus(format_args!(
+                "servo {id} does not answer. Check its power, cable, id and baud rate; \
+                 `handwave bus scan BUS --baud all` finds servos"
+            )),
+            other => Failure::bus(other),
+        }
+    }
+}
+
+impl From<AddressError> for Failure {
+    fn from(error: AddressError) -> Self {
+        Failure::input(error)
+    }
+}
+
+/// Prints one line. A closed pipe ends the command like any other failure to write.
+fn say(out: &mut dyn Write, line: impl std::fmt::Display) -> Result<(), Failure> {
+    writeln!(out, "{line}")
+        .map_err(|error| Failure::input(format_args!("standard output: {error}")))
+}
+
+/// Name of a model number, for tables.
+fn model_name(number: u16) -> &'static str {
+    Model::by_number(number).map_or("unknown", |model| model.name)
+}
