@@ -18,10 +18,10 @@ use std::time::Duration;
 fn damaged_and_senseless_instructions_are_not_obeyed() {
     let mut host = Host::new(2);
     host.send(&[0xFF, 0xFF, 0xFD, 0x00, 1, 3, 0, 1, 0x19, 0x4F]);
-    assert_eq!(host.hear(), [], "a wrong checksum is not answered");
+    assert!(host.hear().is_empty(), "a wrong checksum is not answered");
     host.send(&[0xFF; 300]);
     host.send(&[0xFF, 0xFF, 0xFD, 0x00, 1, 0xFF, 0xFF]);
-    assert_eq!(host.hear(), [], "garbage is not answered");
+    assert!(host.hear().is_empty(), "garbage is not answered");
     host.wait(0.02);
     assert_eq!(host.tell(1, Instruction::Ping).len(), 1, "after garbage");
     let mut buf = [0; 64];
