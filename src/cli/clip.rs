@@ -27,7 +27,7 @@ enum ClipCommand {
 A gait is a preset (walk, trot, pace, bound, stand) or a description file, in which
 poses of the body can also be strung together (bow, crouch). What the joints are too
 slow for is shortened, with a note; --strict refuses it instead.")]
-    Gait(GaitArgs),
+    Gait(Box<GaitArgs>),
     /// Show what is in a clip: joints, frames, cycle, travel, limbs, ranges
     Info {
         /// The clip

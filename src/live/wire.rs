@@ -87,7 +87,7 @@ pub fn open(
 
 fn simulated_line(character: &Character) -> Result<SharedLine, WireError> {
     let name = character.servos.first().map_or("", |s| s.model.name);
-    let model = sim::table::model(name).ok_or_else(|| WireError::Model(name.into()))?;
+    let model = sim::models::model(name).ok_or_else(|| WireError::Model(name.into()))?;
     let ids = character.servos.iter().map(|s| s.id);
     let line = Line::commissioned(model, ids, character.sim_baud, LineOptions::default()).ok_or(
         WireError::Baud {

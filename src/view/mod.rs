@@ -18,7 +18,7 @@ pub enum Display {
     /// Not at all.
     Quiet,
     /// A line of text every second.
-    Lines(Lines),
+    Lines(Box<Lines>),
     /// The whole terminal.
     #[cfg(feature = "tui")]
     Terminal(Box<Terminal>),
@@ -34,7 +34,7 @@ impl Display {
             return Display::Terminal(Box::new(terminal));
         }
         let _ = stop;
-        Display::Lines(Lines::new(character))
+        Display::Lines(Box::new(Lines::new(character)))
     }
 
     /// Counts one cycle.

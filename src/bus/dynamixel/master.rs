@@ -349,12 +349,14 @@ impl Client for Master {
         // The servo whose turn it is.
         let mut turn = 0;
         while turn < ids.len() {
-            let answers = turn + 1;
-            let due = self.due(answers as u32, answers * answer_bytes);
+            // Some servos pass over a silent predecessor when its time is over: the wait lasts until
+            // the second one behind it had its turn, or its answer would collide with the next request.
+            let latest = (turn + 3).min(ids.len());
+            let deadline = self.due(latest as u32, latest * answer_bytes) + self.allowance;
             let want = (ids.len() - turn) * answer_bytes;
             let mut heard = turn;
             let bad_crc = self.parser.damage().bad_crc;
-            let answered = self.receive(want, due + self.allowance, |status| {
+            let answered = self.receive(want, deadline, |status| {
                 let index = ids.iter().position(|&id| id == status.id);
                 let Some(index) = index.filter(|&index| outcomes[index] == Outcome::NotReached)
                 else {
@@ -376,19 +378,19 @@ impl Client for Master {
                 };
                 Accepted::Done
             })?;
+            let missing = if self.parser.damage().bad_crc > bad_crc {
+                Outcome::Damaged
+            } else {
+                Outcome::Silent
+            };
             if !answered {
-                outcomes[turn] = if self.parser.damage().bad_crc > bad_crc {
-                    Outcome::Damaged
-                } else {
-                    Outcome::Silent
-                };
+                outcomes[turn] = missing;
                 self.missed();
                 return Ok(());
             }
             for passed in &mut outcomes[turn..heard.max(turn)] {
                 if *passed == Outcome::NotReached {
-                    // A later servo answers only when it heard this one: the answer was lost on the way.
-                    *passed = Outcome::Damaged;
+                    *passed = missing;
                 }
             }
             turn = turn.max(heard + 1);
