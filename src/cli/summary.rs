@@ -3,6 +3,7 @@
 use crate::config::Character;
 use crate::live::control::Ending;
 use crate::live::session::Report;
+use crate::live::stats::{FaultKind, Percentiles};
 use serde_json::{Value, json};
 
 /// The summary as one JSON object.
@@ -46,9 +47,7 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
 /// The summary as text.
 pub fn to_text(report: &Report, character: &Character) -> String {
     let stats = &report.stats;
-    let line = |p: crate::live::stats::Percentiles| {
-        format!("p50 {} us, p99 {} us, max {} us", p.p50, p.p99, p.max)
-    };
+    let line = |p: Percentiles| format!("p50 {} us, p99 {} us, max {} us", p.p50, p.p99, p.max);
     let share = |n: u64| 100.0 * n as f64 / stats.cycles.max(1) as f64;
     let mut text = format!(
         "{}: {}\n\
@@ -82,19 +81,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         line(stats.step.percentiles()),
         line(stats.lateness.percentiles()),
     );
-    for fault in &stats.faults {
-        let until = fault.to_s.map_or("the end".into(), |t| format!("{t:.3} s"));
-        text += &format!(
-            "fault         servo {} (joint {}) {} from {:.3} s to {until}\n",
-            character.servos[fault.joint].id,
-            character.joints[fault.joint],
-            fault.kind.as_str(),
-            fault.from_s,
-        );
-    }
-    if stats.more_faults > 0 {
-        text += &format!("fault         and {} more\n", stats.more_faults);
-    }
+    text += &fault_lines(report, character);
     if let Some(torque) = &report.torque {
         text += &format!(
             "torque        off, read back from {} of {} servos\n",
@@ -117,6 +104,46 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         .chain(report.real_time.iter().flat_map(|r| &r.notes))
     {
         text += &format!("note          {note}\n");
+    }
+    text
+}
+
+/// One line per servo and kind of fault, with the first few times.
+fn fault_lines(report: &Report, character: &Character) -> String {
+    const TIMES: usize = 3;
+    let stats = &report.stats;
+    let mut text = String::new();
+    for (joint, name) in character.joints.iter().enumerate() {
+        for kind in FaultKind::ALL {
+            let times: Vec<String> = stats
+                .faults
+                .iter()
+                .filter(|f| f.joint == joint && f.kind == kind)
+                .map(|f| match f.to_s {
+                    Some(to) => format!("{:.3}..{to:.3} s", f.from_s),
+                    None => format!("{:.3} s to the end", f.from_s),
+                })
+                .collect();
+            if times.is_empty() {
+                continue;
+            }
+            let more = match times.len().saturating_sub(TIMES) {
+                0 => String::new(),
+                n => format!(" and {n} more times"),
+            };
+            text += &format!(
+                "fault         servo {} (joint {name}) {} {}{more}\n",
+                character.servos[joint].id,
+                kind.as_str(),
+                times[..times.len().min(TIMES)].join(", "),
+            );
+        }
+    }
+    if stats.more_faults > 0 {
+        text += &format!(
+            "fault         {} more are only counted\n",
+            stats.more_faults
+        );
     }
     text
 }

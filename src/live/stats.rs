@@ -23,14 +23,20 @@ pub enum FaultKind {
     Silent,
     /// The answer carried the alert flag: a hardware error is latched.
     Alert,
+    /// The servo came back without torque and is not driven.
+    Torqueless,
 }
 
 impl FaultKind {
+    /// All kinds, in the order in which [`Stats::bus`] keeps them.
+    pub const ALL: [FaultKind; 3] = [FaultKind::Silent, FaultKind::Alert, FaultKind::Torqueless];
+
     /// For messages.
     pub fn as_str(self) -> &'static str {
         match self {
             FaultKind::Silent => "silent",
             FaultKind::Alert => "hardware error",
+            FaultKind::Torqueless => "without torque",
         }
     }
 }
@@ -113,7 +119,7 @@ pub struct Stats {
     pub faults: Vec<ServoFault>,
     /// Faults beyond those kept.
     pub more_faults: u64,
-    open: [u64; 2],
+    open: [u64; FaultKind::ALL.len()],
 }
 
 /// Faults kept with their times; more are only counted.
@@ -137,7 +143,7 @@ impl Default for Stats {
             pose_to_wire: Microseconds::default(),
             faults: Vec::with_capacity(FAULTS_KEPT),
             more_faults: 0,
-            open: [0; 2],
+            open: [0; FaultKind::ALL.len()],
         }
     }
 }
@@ -150,10 +156,11 @@ impl Stats {
         self.bytes += u64::from(report.bytes);
         self.exchange.add(u64::from(report.cycle_us));
         let masks = [
-            (FaultKind::Silent, report.silent_mask),
-            (FaultKind::Alert, report.alert_mask),
+            report.silent_mask,
+            report.alert_mask,
+            report.torqueless_mask,
         ];
-        for (slot, (kind, mask)) in masks.into_iter().enumerate() {
+        for (slot, (kind, mask)) in FaultKind::ALL.into_iter().zip(masks).enumerate() {
             let mut changed = mask ^ self.open[slot];
             self.open[slot] = mask;
             while changed != 0 {

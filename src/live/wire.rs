@@ -4,7 +4,7 @@ use crate::base::{Clock, Time};
 use crate::bus::dynamixel::{
     ChainOptions, Client, DynamixelChain, Master, MasterOptions, SpecError,
 };
-use crate::bus::{BusAddress, DynamixelBackend, PortError, SerialPort, ServoBus};
+use crate::bus::{BusAddress, DynamixelBackend, Port, PortError, SerialPort, ServoBus};
 use crate::config::Character;
 use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
 use std::sync::Arc;
@@ -65,18 +65,13 @@ pub fn open(
         BusAddress::Sim => {
             let line = simulated_line(character)?;
             let port = SimPort::new(line.clone(), clock, character.sim_baud);
-            // The simulated adapter has no delay of its own, so a short wait tells silence.
-            let options = MasterOptions {
-                max_allowance: Duration::from_millis(1),
-                ..MasterOptions::default()
-            };
-            (Box::new(Master::new(Box::new(port), options)), Some(line))
+            (own_client(Box::new(port), rate_hz), Some(line))
         }
         BusAddress::Dynamixel {
             path,
             baud,
             backend,
-        } => (serial_client(path, *baud, *backend, clock)?, None),
+        } => (serial_client(path, *baud, *backend, clock, rate_hz)?, None),
     };
     let chain = DynamixelChain::new(client, character.servos.clone(), options)?;
     Ok(Wire {
@@ -103,9 +98,12 @@ fn serial_client(
     baud: u32,
     backend: DynamixelBackend,
     clock: Arc<dyn Clock>,
+    rate_hz: f64,
 ) -> Result<Box<dyn Client>, WireError> {
     Ok(match backend {
-        DynamixelBackend::Handwave => own_client(path, baud, clock)?,
+        DynamixelBackend::Handwave => {
+            own_client(Box::new(SerialPort::open(path, baud, clock)?), rate_hz)
+        }
         DynamixelBackend::Dynamixel2 => Box::new(crate::bus::dynamixel::Dynamixel2Client::open(
             path, baud, clock,
         )?),
@@ -118,19 +116,29 @@ fn serial_client(
     baud: u32,
     backend: DynamixelBackend,
     clock: Arc<dyn Clock>,
+    rate_hz: f64,
 ) -> Result<Box<dyn Client>, WireError> {
     match backend {
-        DynamixelBackend::Handwave => own_client(path, baud, clock),
+        DynamixelBackend::Handwave => Ok(own_client(
+            Box::new(SerialPort::open(path, baud, clock)?),
+            rate_hz,
+        )),
         DynamixelBackend::Dynamixel2 => Err(WireError::NoBackend),
     }
 }
 
-fn own_client(path: &str, baud: u32, clock: Arc<dyn Clock>) -> Result<Box<dyn Client>, WireError> {
-    let port = SerialPort::open(path, baud, clock)?;
-    Ok(Box::new(Master::new(
-        Box::new(port),
-        MasterOptions::default(),
-    )))
+/// Our own master. A late answer is waited for up to a fifth of the cycle beyond its time on the wire
+/// (at most 1 ms): less takes a busy system for a silent servo, more leaves no time to ask again.
+fn own_client(port: Box<dyn Port>, rate_hz: f64) -> Box<dyn Client> {
+    let allowance = Duration::from_secs_f64(0.2 / rate_hz).min(Duration::from_millis(1));
+    let options = MasterOptions::default();
+    Box::new(Master::new(
+        port,
+        MasterOptions {
+            min_allowance: allowance.min(options.max_allowance),
+            ..options
+        },
+    ))
 }
 
 /// Injects `faults`, whose times count from `start`. Their servos were checked when they were parsed.
