@@ -24,6 +24,8 @@ pub struct CycleRecord {
     pub gestures: Vec<GestureEstimate>,
     /// What each class did.
     pub played: Vec<Played>,
+    /// Blend weight of every clip of the class being played.
+    pub clips: Vec<f64>,
     /// Weight of each layer.
     pub layers: Vec<f64>,
     /// Class being played.
