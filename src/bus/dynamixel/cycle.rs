@@ -259,6 +259,7 @@ impl DynamixelChain {
             servo.link = Link::Silent;
             // The first time at once: a single lost answer should not cost a quarter of a second.
             servo.retry_at = now;
+            servo.retry_after = self.options.retry_every / 16;
         }
     }
 }

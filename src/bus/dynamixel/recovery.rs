@@ -38,7 +38,9 @@ impl DynamixelChain {
         if !(room || overdue || everybody_silent) {
             return Ok(());
         }
-        self.servos[index].retry_at = now + self.options.retry_every;
+        let servo = &mut self.servos[index];
+        servo.retry_at = now + servo.retry_after;
+        servo.retry_after = (servo.retry_after * 2).min(self.options.retry_every);
         match self.welcome_back(index) {
             Ok(()) => {
                 self.last_heard = self.client.now();
