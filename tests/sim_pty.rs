@@ -4,7 +4,7 @@ use dynamixel2::instructions::SyncWriteData;
 use handwave::base::Clock;
 use handwave::live::RealClock;
 use handwave::sim::line::SharedLine;
-use handwave::sim::table::XL430_W250;
+use handwave::sim::models::XL430_W250;
 use handwave::sim::{Line, LineOptions, PtyServer};
 use handwave_dynamixel::{BROADCAST_ID, fast, instruction::Instruction, lists};
 use std::os::fd::AsFd;

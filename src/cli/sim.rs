@@ -6,7 +6,8 @@ use crate::base::suggest::nearest;
 use crate::live::RealClock;
 use crate::sim::fault::FAULTS;
 use crate::sim::line::SharedLine;
-use crate::sim::table::{self, MODELS, Model};
+use crate::sim::models::{self, MODELS};
+use crate::sim::table::Model;
 use crate::sim::{FaultSpec, Line, LineOptions, PtyServer, Servo};
 use clap::{Args, Subcommand};
 use handwave_dynamixel::{MAX_ID, baud};
@@ -168,7 +169,7 @@ fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Model)>, String> {
     let mut servos: Vec<(u8, &'static Model)> = Vec::new();
     for part in list.split(',') {
         let (ids, name) = part.split_once(':').unwrap_or((part, MODELS[0].name));
-        let model = table::model(name).ok_or_else(|| {
+        let model = models::model(name).ok_or_else(|| {
             let known = MODELS.iter().map(|model| model.name);
             match nearest(name, known.clone()) {
                 Some(near) => format!("--servos: unknown model '{name}'; did you mean '{near}'?"),

@@ -1,7 +1,8 @@
 //! What a servo does on each instruction, and what it answers.
 
+use super::models::addr;
 use super::servo::{Servo, is_backed_up_ram};
-use super::table::{RAM_START, TableError, addr};
+use super::table::{RAM_START, TableError};
 use crate::base::Time;
 use handwave_dynamixel::instruction::{Backup, FactoryReset, Instruction};
 

@@ -5,13 +5,16 @@
 //! [`SimPort`] inside the process, in virtual or real time, and a [`PtyServer`] on a
 //! pseudo-terminal for any client.
 
+mod answers;
 mod chain;
 pub mod fault;
 mod instructions;
 pub mod line;
+pub mod models;
 pub mod motor;
 pub mod port;
 pub mod pty;
+mod registers;
 pub mod servo;
 pub mod table;
 mod wire;

@@ -1,7 +1,8 @@
 //! One simulated servo: control table, motor, latched errors, bus watchdog, moved along by time alone.
 
+use super::models::addr;
 use super::motor::{Motor, Profile, SUBSTEP_NANOS};
-use super::table::{ControlTable, Model, TableError, addr};
+use super::table::{ControlTable, Model};
 use crate::base::Time;
 use std::f64::consts::TAU;
 use std::time::Duration;
@@ -16,7 +17,7 @@ pub const ACCELERATION_UNIT_RAD_S2: f64 = 214.577 * TAU / 3600.0;
 pub const BOOT_TIME: Duration = Duration::from_millis(250);
 
 /// Goal PWM at full duty.
-const FULL_PWM: f64 = 885.0;
+pub(super) const FULL_PWM: f64 = 885.0;
 /// Position P Gain that makes one PWM unit per pulse of error.
 ///
 /// The manual divides by 128; 100 makes up for the derivative gain, which is not modelled, and lets
@@ -24,11 +25,6 @@ const FULL_PWM: f64 = 885.0;
 const POSITION_P_DIVISOR: f64 = 100.0;
 /// Velocity error, as a share of the no-load speed, times this is duty in velocity mode.
 const VELOCITY_GAIN: f64 = 4.0;
-/// Pulses from the goal within which a servo counts as in position.
-const IN_POSITION_PULSES: f64 = 10.0;
-/// Pulses from the path beyond which Moving Status tells a following error.
-const FOLLOWING_ERROR_PULSES: f64 = 200.0;
-
 /// Bits of Hardware Error Status (70).
 pub mod hardware_error {
     /// Input voltage out of range.
@@ -60,17 +56,17 @@ pub struct Ailments {
 
 /// What the control loop needs of the table, taken over after each write.
 #[derive(Copy, Clone, Debug, Default)]
-struct Setpoint {
-    mode: u8,
-    torque_on: bool,
-    goal_rad: f64,
-    goal_rad_s: f64,
-    goal_duty: f64,
-    duty_limit: f64,
-    duty_per_rad: f64,
-    speed: Option<f64>,
-    acceleration: Option<f64>,
-    direction: f64,
+pub(super) struct Setpoint {
+    pub mode: u8,
+    pub torque_on: bool,
+    pub goal_rad: f64,
+    pub goal_rad_s: f64,
+    pub goal_duty: f64,
+    pub duty_limit: f64,
+    pub duty_per_rad: f64,
+    pub speed: Option<f64>,
+    pub acceleration: Option<f64>,
+    pub direction: f64,
 }
 
 /// A simulated servo.
@@ -78,12 +74,12 @@ struct Setpoint {
 pub struct Servo {
     pub(super) table: ControlTable,
     pub(super) motor: Motor,
-    profile: Profile,
-    setpoint: Setpoint,
-    ailments: Ailments,
+    pub(super) profile: Profile,
+    pub(super) setpoint: Setpoint,
+    pub(super) ailments: Ailments,
     /// Substeps integrated so far, counted from time zero.
     substep: i64,
-    booted_at: Time,
+    pub(super) booted_at: Time,
     offline_until: Time,
     fed_at: Time,
     pub(super) held_write: Option<u16>,
@@ -211,149 +207,6 @@ impl Servo {
         self.integrate(now);
     }
 
-    /// Brings the registers that show the present state up to date.
-    pub(super) fn refresh(&mut self, now: Time) {
-        let pulses = self.position_pulses();
-        let direction = self.setpoint.direction;
-        let speed = self.speed_rad_s() / VELOCITY_UNIT_RAD_S;
-        let path = self.to_pulses(self.profile.angle_rad);
-        let path_speed = self.profile.speed_rad_s * direction / VELOCITY_UNIT_RAD_S;
-        let positioning = self.setpoint.torque_on && self.is_positioning();
-        let on_the_way = positioning && !self.profile.arrived(self.setpoint.goal_rad);
-        let threshold = f64::from(self.table.get(addr::MOVING_THRESHOLD));
-        let moving = speed.abs() > threshold || on_the_way;
-        let goal = self.to_pulses(self.setpoint.goal_rad);
-        let mut status = 0;
-        if positioning && (goal - pulses).abs() <= IN_POSITION_PULSES {
-            status |= 1;
-        }
-        if on_the_way {
-            let shape = if self.setpoint.acceleration.is_some() {
-                3
-            } else {
-                1
-            };
-            status |= 1 << 1 | shape << 4;
-        }
-        if positioning && (path - pulses).abs() > FOLLOWING_ERROR_PULSES {
-            status |= 1 << 3;
-        }
-        let tick = now.saturating_since(self.booted_at).as_millis() % 32_768;
-        let voltage = self.ailments.voltage_v.unwrap_or(11.1);
-        let temperature = self.ailments.temperature_c.unwrap_or(32.0);
-        for (register, value) in [
-            (addr::REALTIME_TICK, tick as i64),
-            (addr::MOVING, i64::from(moving)),
-            (addr::MOVING_STATUS, status),
-            (
-                addr::PRESENT_PWM,
-                (self.motor.duty * direction * FULL_PWM).round() as i64,
-            ),
-            (
-                addr::PRESENT_LOAD,
-                (self.motor.effort() * direction * 1000.0).round() as i64,
-            ),
-            (addr::PRESENT_VELOCITY, speed.round() as i64),
-            (addr::PRESENT_POSITION, pulses.round() as i64),
-            (addr::VELOCITY_TRAJECTORY, path_speed.round() as i64),
-            (addr::POSITION_TRAJECTORY, path.round() as i64),
-            (addr::PRESENT_INPUT_VOLTAGE, (voltage * 10.0).round() as i64),
-            (addr::PRESENT_TEMPERATURE, temperature.round() as i64),
-            (addr::BACKUP_READY, i64::from(self.backup.is_some())),
-        ] {
-            self.table.set(register, value);
-        }
-    }
-
-    /// Takes a write that was checked: stores it and does what the registers in it cause.
-    pub(super) fn apply_write(&mut self, address: u16, data: &[u8]) {
-        let pulses = self.position_pulses();
-        let mode = self.table.get(addr::OPERATING_MODE);
-        let torque_on = self.setpoint.torque_on;
-        self.table.store(address, data);
-        let touched = |register: u16| {
-            (0..data.len()).any(|i| self.table.resolve(address + i as u16) == register)
-        };
-        let goal_written = touched(addr::GOAL_POSITION);
-        let mode_written = touched(addr::OPERATING_MODE);
-        if mode_written && self.table.get(addr::OPERATING_MODE) != mode {
-            self.change_mode();
-        }
-        if !torque_on && self.table.get(addr::TORQUE_ENABLE) != 0 {
-            if self.shut_down() {
-                // Latched until a reboot; the servo answers, and its torque stays off.
-                self.table.set(addr::TORQUE_ENABLE, 0);
-            } else {
-                self.profile.angle_rad = self.motor.angle_rad;
-                self.profile.speed_rad_s = 0.0;
-            }
-        }
-        self.take_setpoint();
-        if goal_written {
-            self.time_profile();
-        }
-        // Homing offset and direction change what is shown, not where the shaft is.
-        let shift = self.position_pulses() - pulses;
-        if shift != 0.0 && !goal_written {
-            let goal = i64::from(self.table.get_signed(addr::GOAL_POSITION));
-            self.table
-                .set(addr::GOAL_POSITION, goal + shift.round() as i64);
-            self.take_setpoint();
-        }
-    }
-
-    /// What the register's neighbours allow: limits, modes, the watchdog's lock.
-    pub(super) fn check_value(&self, register: u16, value: i64) -> Result<(), TableError> {
-        let limit = |addr| i64::from(self.table.get(addr));
-        let goal = matches!(
-            register,
-            addr::GOAL_PWM | addr::GOAL_VELOCITY | addr::GOAL_POSITION
-        );
-        if goal && self.watchdog_tripped() {
-            return Err(TableError::Range);
-        }
-        let within = match register {
-            addr::GOAL_PWM => value.abs() <= limit(addr::PWM_LIMIT),
-            addr::GOAL_VELOCITY => value.abs() <= limit(addr::VELOCITY_LIMIT),
-            addr::GOAL_POSITION => match self.table.get(addr::OPERATING_MODE) {
-                3 => {
-                    let allowed = limit(addr::MIN_POSITION_LIMIT)..=limit(addr::MAX_POSITION_LIMIT);
-                    allowed.contains(&value)
-                }
-                _ => value.abs() < 256 * 4096,
-            },
-            addr::OPERATING_MODE if !self.modes().contains(&(value as u8)) => {
-                return Err(TableError::Range);
-            }
-            _ => true,
-        };
-        if within {
-            Ok(())
-        } else {
-            Err(TableError::Limit)
-        }
-    }
-
-    /// Forgets full turns: the position comes back into 0..4095, apart from the homing offset.
-    pub(super) fn clear_turns(&mut self) {
-        self.motor.angle_rad = self.motor.angle_rad.rem_euclid(TAU);
-        self.profile.angle_rad = self.motor.angle_rad;
-        self.profile.speed_rad_s = 0.0;
-        let pulses = self.position_pulses().round() as i64;
-        self.table.set(addr::GOAL_POSITION, pulses);
-        self.take_setpoint();
-    }
-
-    /// Whether the shaft turns or is on its way.
-    pub(super) fn is_moving(&self) -> bool {
-        self.speed_rad_s().abs() / VELOCITY_UNIT_RAD_S
-            > f64::from(self.table.get(addr::MOVING_THRESHOLD))
-    }
-
-    fn modes(&self) -> &'static [u8] {
-        self.table.model().modes
-    }
-
     fn boot(&mut self) {
         let restore = self.table.get(addr::STARTUP_CONFIGURATION);
         self.table.reset(|addr| addr >= super::table::RAM_START);
@@ -371,24 +224,7 @@ impl Servo {
         self.latch_errors();
     }
 
-    fn change_mode(&mut self) {
-        self.table
-            .reset(|a| (addr::VELOCITY_I_GAIN..=addr::FEEDFORWARD_1ST_GAIN).contains(&a));
-        self.table.set(addr::PROFILE_ACCELERATION, 0);
-        self.table.set(addr::PROFILE_VELOCITY, 0);
-        self.table.set(addr::GOAL_VELOCITY, 0);
-        self.table
-            .set(addr::GOAL_PWM, i64::from(self.table.get(addr::PWM_LIMIT)));
-        if self.table.get(addr::OPERATING_MODE) == 3 {
-            self.take_setpoint();
-            self.clear_turns();
-        } else {
-            let pulses = self.position_pulses().round() as i64;
-            self.table.set(addr::GOAL_POSITION, pulses);
-        }
-    }
-
-    fn take_setpoint(&mut self) {
+    pub(super) fn take_setpoint(&mut self) {
         let table = &self.table;
         let unit = |addr, scale: f64| match table.get(addr) {
             0 => None,
@@ -427,7 +263,7 @@ impl Servo {
     }
 
     /// Time-based profile: the limits that reach the new goal in the milliseconds of registers 112 and 108.
-    fn time_profile(&mut self) {
+    pub(super) fn time_profile(&mut self) {
         if self.table.get(addr::DRIVE_MODE) & 4 == 0 {
             return;
         }
@@ -440,7 +276,7 @@ impl Servo {
         self.setpoint.speed = speed;
     }
 
-    fn to_pulses(&self, angle_rad: f64) -> f64 {
+    pub(super) fn to_pulses(&self, angle_rad: f64) -> f64 {
         let offset = f64::from(self.table.get_signed(addr::HOMING_OFFSET));
         2048.0 + (angle_rad / PULSE_RAD - 2048.0) * self.setpoint.direction + offset
     }
@@ -450,11 +286,11 @@ impl Servo {
         (2048.0 + (pulses - offset - 2048.0) * self.setpoint.direction) * PULSE_RAD
     }
 
-    fn is_positioning(&self) -> bool {
+    pub(super) fn is_positioning(&self) -> bool {
         matches!(self.setpoint.mode, 3 | 4)
     }
 
-    fn shut_down(&self) -> bool {
+    pub(super) fn shut_down(&self) -> bool {
         self.table.get(addr::HARDWARE_ERROR_STATUS) & self.table.get(addr::SHUTDOWN) != 0
     }
 
@@ -469,7 +305,7 @@ impl Servo {
         }
     }
 
-    fn watchdog_tripped(&self) -> bool {
+    pub(super) fn watchdog_tripped(&self) -> bool {
         self.table.get_signed(addr::BUS_WATCHDOG) == -1
     }
 
