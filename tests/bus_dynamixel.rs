@@ -7,7 +7,7 @@ use handwave::bus::dynamixel::{
 };
 use handwave::bus::{BusError, CycleReport, ServoBus};
 use handwave::sim::line::SharedLine;
-use handwave::sim::table::XL430_W250;
+use handwave::sim::models::XL430_W250;
 use handwave::sim::{AfterSilence, Line, LineOptions, Servo, SimPort};
 use std::sync::Arc;
 use std::time::Duration;
