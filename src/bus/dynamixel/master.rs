@@ -28,7 +28,7 @@ pub struct MasterOptions {
     /// Largest return delay of the servos until the chain knows better. Default 508 us, the most
     /// that register 9 can hold.
     pub return_delay: Duration,
-    /// Least allowance for adapter and system. Default 400 us.
+    /// Least allowance for adapter and system. Default 600 us.
     pub min_allowance: Duration,
     /// Most allowance, and the one to begin with. Default 4 ms: a USB adapter with a latency timer
     /// of 1 ms, or a busy system.
@@ -39,7 +39,7 @@ impl Default for MasterOptions {
     fn default() -> Self {
         MasterOptions {
             return_delay: wire::return_delay(254),
-            min_allowance: Duration::from_micros(400),
+            min_allowance: Duration::from_micros(600),
             max_allowance: Duration::from_millis(4),
         }
     }
