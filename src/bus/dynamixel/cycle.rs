@@ -257,8 +257,9 @@ impl DynamixelChain {
         let now = self.client.now();
         for servo in self.servos.iter_mut().filter(|servo| servo.mute) {
             servo.link = Link::Silent;
-            // The first time at once: a single lost answer should not cost a quarter of a second.
+            // The first time in the next cycle: a single lost answer should not cost a quarter of a second.
             servo.retry_at = now;
+            servo.retry_after = self.options.retry_every / 16;
         }
     }
 }
