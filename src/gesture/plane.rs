@@ -41,7 +41,11 @@ impl References {
     pub fn new(set: &GestureSet) -> Result<Self, String> {
         let mut fit = GlobalFit::new(&set.header, &set.reference, &set.global)?;
         let frames = || set.gestures.iter().flat_map(|gesture| &gesture.frames);
-        fit.weigh(frames().map(Vec::as_slice));
+        // Twice: the first weights come from a fit to which the gestures themselves still belonged.
+        // Not oftener: the weights would gather on whichever point moves least.
+        for _ in 0..2 {
+            fit.weigh(frames().map(Vec::as_slice));
+        }
         let mut out = vec![[0.0; 3]; set.header.points.len()];
         let mut flat = |frame: &Vec<[f64; 3]>| {
             fit.remove(frame, None, &mut out);
