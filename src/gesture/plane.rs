@@ -284,10 +284,9 @@ impl Plane {
         if with_variance && !self.neighbours.is_empty() {
             let relative = pose.iter().zip(self.mean.iter()).map(|(v, m)| v - m);
             let live = self.variance_of(relative);
-            for component in 0..2 {
-                point.variance[component] =
-                    LOOP_SPREAD + 0.5 * (live[component] + self.usual_variance[component]);
-            }
+            let usual = self.usual_variance;
+            point.variance =
+                [0, 1].map(|component| LOOP_SPREAD + 0.5 * (live[component] + usual[component]));
         }
         point
     }
