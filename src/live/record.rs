@@ -74,6 +74,13 @@ impl CycleRecord {
         refill(&mut self.gestures, puppet.estimates().iter().copied());
         refill(&mut self.played, animator.played().iter().copied());
         refill(
+            &mut self.clips,
+            animator.classes()[animator.active()]
+                .weights()
+                .iter()
+                .copied(),
+        );
+        refill(
             &mut self.layers,
             animator.layers().iter().map(|l| l.weight()),
         );

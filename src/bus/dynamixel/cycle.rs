@@ -50,7 +50,11 @@ impl DynamixelChain {
 
         self.send_goals(targets_rad, step.as_secs_f64())?;
         report.goal_sent_us = micros(self.client.now().saturating_since(begin));
-        self.read_states(states, &mut report, begin)?;
+        self.client
+            .set_cycle_end(Some(begin + self.options.cycle_budget));
+        let read = self.read_states(states, &mut report, begin);
+        self.client.set_cycle_end(None);
+        read?;
         self.retry_one(begin)?;
 
         let now = self.client.now();

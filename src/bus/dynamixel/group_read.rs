@@ -30,7 +30,8 @@ impl Master {
             // Some servos pass over a silent predecessor when its time is over: the wait lasts until
             // the second one behind it had its turn, or its answer would collide with the next request.
             let latest = (turn + 3).min(ids.len());
-            let deadline = self.due(latest as u32, latest * answer_bytes) + self.allowance.get();
+            let due = self.due(latest as u32, latest * answer_bytes);
+            let deadline = self.deadline(due, ids.len() - turn - 1, size);
             let want = (ids.len() - turn) * answer_bytes;
             let mut heard = turn;
             let bad_crc = self.parser.damage().bad_crc;
@@ -171,7 +172,8 @@ impl Master {
             }
             let whole_blocks = got.saturating_sub(fast::PREFIX_LEN) / block;
             let next = wire::fast_status((whole_blocks + 1).min(servos), size);
-            let deadline = self.due(1, next) + self.allowance.get();
+            let behind = servos.saturating_sub(whole_blocks + 1);
+            let deadline = self.deadline(self.due(1, next), behind, size);
             let rest = (total - got).min(FAST_BYTES - filled);
             let place = &mut self.combined[filled..filled + rest];
             let count = self.port.read(place, rest, deadline)?;

@@ -45,6 +45,9 @@ impl Default for MasterOptions {
     }
 }
 
+/// Left of a control cycle after the servos behind a silent one were asked again.
+const SPARE_MARGIN: Duration = Duration::from_micros(300);
+
 /// Speaks Protocol 2.0 over a [`Port`].
 pub struct Master {
     pub(super) port: Box<dyn Port>,
@@ -52,6 +55,7 @@ pub struct Master {
     pub(super) allowance: Allowance,
     /// When the last byte handed to the port leaves it.
     line_free_at: Time,
+    cycle_end: Option<Time>,
     pub(super) parser: FrameParser<FRAME_BYTES>,
     /// Bytes of a combined status.
     pub(super) combined: Box<[u8; FAST_BYTES]>,
@@ -70,6 +74,7 @@ impl Master {
             return_delay: options.return_delay,
             allowance: Allowance::new(options.min_allowance, options.max_allowance),
             line_free_at: Time::ZERO,
+            cycle_end: None,
             parser: FrameParser::new(),
             combined: Box::new([0; FAST_BYTES]),
             out: Box::new([0; FRAME_BYTES]),
@@ -117,6 +122,17 @@ impl Master {
     /// When `bytes` of answers to the request just sent must be there if nobody is late.
     pub(super) fn due(&self, delays: u32, bytes: usize) -> Time {
         self.line_free_at + self.return_delay * delays + self.wire_time(bytes)
+    }
+
+    /// Until when the next part of an answer due at `due` is waited for, when `behind` servos with
+    /// answers of `size` bytes would be asked again if it does not come.
+    pub(super) fn deadline(&self, due: Time, behind: usize, size: usize) -> Time {
+        let again = wire::sync_read(behind) + wire::fast_status(behind, size);
+        let spare = self
+            .cycle_end
+            .map(|end| end - self.wire_time(again) - SPARE_MARGIN);
+        let patient = due + self.allowance.get();
+        spare.map_or(patient, |spare| patient.max(spare))
     }
 
     /// Learns from an answer that was complete just now and due at `due`.
@@ -260,6 +276,10 @@ impl Client for Master {
 
     fn patience(&self) -> Duration {
         self.return_delay + self.allowance.get()
+    }
+
+    fn set_cycle_end(&mut self, end: Option<Time>) {
+        self.cycle_end = end;
     }
 
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError> {
