@@ -7,7 +7,7 @@ use crate::live::RealClock;
 use crate::sim::fault::FAULTS;
 use crate::sim::line::SharedLine;
 use crate::sim::models::{self, MODELS};
-use crate::sim::table::Model;
+use crate::sim::table::Device;
 use crate::sim::{FaultSpec, Line, LineOptions, PtyServer, Servo};
 use clap::{Args, Subcommand};
 use handwave_dynamixel::{MAX_ID, baud};
@@ -126,7 +126,7 @@ fn dynamixel(args: &DynamixelArgs) -> Result<ExitStatus, Failure> {
 
 fn build_line(
     args: &DynamixelArgs,
-    servos: &[(u8, &'static Model)],
+    servos: &[(u8, &'static Device)],
 ) -> Result<(Line, u32), String> {
     if !(0.0..=1000.0).contains(&args.latency_ms) {
         return Err(format!(
@@ -135,11 +135,10 @@ fn build_line(
         ));
     }
     let code = baud::code(args.baud).ok_or_else(|| {
-        let rates: Vec<_> = baud::RATES.iter().map(u32::to_string).collect();
         format!(
             "--baud {} is no rate of these servos; there are {}",
             args.baud,
-            rates.join(", ")
+            baud::RateList
         )
     })?;
     let mut line = Line::new(LineOptions {
@@ -149,12 +148,12 @@ fn build_line(
         ..LineOptions::default()
     });
     let clock_start = crate::base::Time::ZERO;
-    for &(id, model) in servos {
+    for &(id, device) in servos {
         if args.factory {
-            line.attach(id, Servo::factory(model));
+            line.attach(id, Servo::factory(device));
             line.set_plugged(id, servos.len() == 1, clock_start);
         } else {
-            line.attach(id, Servo::commissioned(model, id, code));
+            line.attach(id, Servo::commissioned(device, id, code));
         }
     }
     for spec in &args.faults {
@@ -165,12 +164,12 @@ fn build_line(
 }
 
 /// Reads `1-12[:MODEL][,20:MODEL...]`.
-fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Model)>, String> {
-    let mut servos: Vec<(u8, &'static Model)> = Vec::new();
+fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Device)>, String> {
+    let mut servos: Vec<(u8, &'static Device)> = Vec::new();
     for part in list.split(',') {
-        let (ids, name) = part.split_once(':').unwrap_or((part, MODELS[0].name));
-        let model = models::model(name).ok_or_else(|| {
-            let known = MODELS.iter().map(|model| model.name);
+        let (ids, name) = part.split_once(':').unwrap_or((part, MODELS[0].model.name));
+        let device = models::model(name).ok_or_else(|| {
+            let known = MODELS.iter().map(|device| device.model.name);
             match nearest(name, known.clone()) {
                 Some(near) => format!("--servos: unknown model '{name}'; did you mean '{near}'?"),
                 None => {
@@ -194,7 +193,7 @@ fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Model)>, String> {
             if servos.iter().any(|(other, _)| *other == id) {
                 return Err(format!("--servos: servo {id} is named twice"));
             }
-            servos.push((id, model));
+            servos.push((id, device));
         }
     }
     Ok(servos)

@@ -3,7 +3,8 @@
 use super::client::{ClientError, Outcome, Reply};
 use super::master::{Accepted, FAST_BYTES, Master};
 use handwave_dynamixel::fast::{self, Blocks};
-use handwave_dynamixel::{BROADCAST_ID, ErrorCode, Instruction, wire};
+use handwave_dynamixel::instruction::{Instruction, SyncRead};
+use handwave_dynamixel::{BROADCAST_ID, ErrorCode, wire};
 
 impl Master {
     /// Sync read: see [`Client::sync_read`](super::Client::sync_read).
@@ -16,11 +17,11 @@ impl Master {
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
         outcomes.fill(Outcome::NotReached);
-        let request = Instruction::SyncRead {
+        let request = Instruction::SyncRead(SyncRead {
             address,
             length,
             ids,
-        };
+        });
         self.send(|buf| request.encode(BROADCAST_ID, buf))?;
         let size = usize::from(length);
         let answer_bytes = wire::status(size);
@@ -96,11 +97,11 @@ impl Master {
             Ok(blocks_len) if total <= FAST_BYTES / 2 => blocks_len,
             _ => return self.read_in_turn(address, length, ids, data, outcomes),
         };
-        let request = Instruction::FastSyncRead {
+        let request = Instruction::FastSyncRead(SyncRead {
             address,
             length,
             ids,
-        };
+        });
         self.send(|buf| request.encode(BROADCAST_ID, buf))?;
         let filled = self.receive_combined(total, blocks_len, ids.len(), size)?;
         let bytes = &self.combined[..filled];
