@@ -1,9 +1,9 @@
 //! `handwave sim`: simulated servos on a pseudo-terminal, for any client.
 
-use super::{ExitStatus, Failure};
+use super::{ExitStatus, Failure, say, warn};
 use crate::base::Clock;
 use crate::base::suggest::nearest;
-use crate::live::RealClock;
+use crate::live::{RealClock, realtime};
 use crate::sim::fault::FAULTS;
 use crate::sim::line::SharedLine;
 use crate::sim::models::{self, MODELS};
@@ -11,7 +11,7 @@ use crate::sim::table::Device;
 use crate::sim::{FaultSpec, Line, LineOptions, PtyServer, Servo};
 use clap::{Args, Subcommand};
 use handwave_dynamixel::{MAX_ID, baud};
-use std::io::{BufRead, Write};
+use std::io::BufRead;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
@@ -87,12 +87,11 @@ pub fn run(args: SimArgs) -> Result<ExitStatus, Failure> {
 }
 
 fn list_faults() -> Result<ExitStatus, Failure> {
-    let mut out = std::io::stdout().lock();
     for info in FAULTS {
-        // A reader that closed the pipe has seen enough.
-        if writeln!(out, "{} {} {}", info.name, info.scope, info.description).is_err() {
-            break;
-        }
+        say(format_args!(
+            "{} {} {}",
+            info.name, info.scope, info.description
+        ));
     }
     Ok(ExitStatus::Done)
 }
@@ -116,10 +115,9 @@ fn dynamixel(args: &DynamixelArgs) -> Result<ExitStatus, Failure> {
     if args.factory {
         std::thread::spawn(move || follow_plugs(&line, clock.as_ref()));
     }
-    let mut out = std::io::stdout();
-    writeln!(out, "ready {}", link.display())
-        .and_then(|()| out.flush())
-        .map_err(Failure::bus)?;
+    // A wire does not wait for the scheduler; without the right to it all still works.
+    let _best_effort = realtime::request();
+    say(format_args!("ready {}", link.display()));
     server.serve(stop.as_fd()).map_err(Failure::bus)?;
     Ok(ExitStatus::Done)
 }
@@ -208,7 +206,9 @@ fn follow_plugs(line: &SharedLine, clock: &dyn Clock) {
             Some(&"unplug") => false,
             None => continue,
             Some(_) => {
-                eprintln!("expected 'plug N' or 'unplug N', found '{command}'");
+                warn(format_args!(
+                    "expected 'plug N' or 'unplug N', found '{command}'"
+                ));
                 continue;
             }
         };
@@ -219,10 +219,10 @@ fn follow_plugs(line: &SharedLine, clock: &dyn Clock) {
         });
         if !found {
             let labels: Vec<_> = line.lock().labels().map(|l| l.to_string()).collect();
-            eprintln!(
+            warn(format_args!(
                 "no such servo in '{command}'; there are {}",
                 labels.join(", ")
-            );
+            ));
         }
     }
 }
