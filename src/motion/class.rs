@@ -282,7 +282,7 @@ impl MotionClass {
         let state = &mut self.state;
         let amplitude = state
             .amplitude
-            .step(wanted.min(1.0), 9.0, 2.5, dt_s)
+            .step(wanted.min(1.0), 9.0, 2.0, dt_s)
             .max(0.0);
         if performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
             let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
