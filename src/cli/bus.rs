@@ -106,10 +106,14 @@ impl From<AddressError> for Failure {
     }
 }
 
-/// Prints one line. A closed pipe ends the command like any other failure to write.
+/// Prints one line. That nobody reads any more, as behind `| head`, is no reason to leave work half done.
 fn say(out: &mut dyn Write, line: impl std::fmt::Display) -> Result<(), Failure> {
-    writeln!(out, "{line}")
-        .map_err(|error| Failure::input(format_args!("standard output: {error}")))
+    match writeln!(out, "{line}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::input(format_args!("standard output: {error}")))
+        }
+        Ok(()) | Err(_) => Ok(()),
+    }
 }
 
 /// Name of a model number, for tables.

@@ -1,6 +1,6 @@
 //! `handwave gesture`: define gestures, estimate their waves over a recording, check a set.
 
-use super::{ExitStatus, Failure, poses};
+use super::{ExitStatus, Failure, poses, say};
 use crate::base::suggest;
 use crate::gesture::{
     CyclicMarks, Definition, EstimatorKind, FrontEnd, FrontEndOptions, GestureKind, GestureSet,
@@ -185,13 +185,13 @@ fn define(args: &DefineArgs) -> Result<ExitStatus, Failure> {
     let replaced = set.put(definition.gesture);
     warn_of_confusion(&set);
     set.save(&args.into).map_err(Failure::input)?;
-    println!(
+    say(format_args!(
         "{}: {} `{}` ({} gestures)",
         args.into.display(),
         if replaced { "replaced" } else { "added" },
         args.name,
         set.gestures.len()
-    );
+    ));
     Ok(ExitStatus::Done)
 }
 
@@ -199,25 +199,24 @@ fn report(definition: &Definition) {
     let gesture = &definition.gesture;
     match gesture.kind {
         GestureKind::Cyclic => {
-            print!(
-                "`{}`: one period of {:.3} s ({:.2} Hz), {} frames, closes within {:.2} of its size",
+            let repeats = definition
+                .periodicity
+                .map_or_else(String::new, |value| format!(", autocorrelation {value:.2}"));
+            say(format_args!(
+                "`{}`: one period of {:.3} s ({:.2} Hz), {} frames, closes within {:.2} of its size{repeats}",
                 gesture.name,
                 gesture.duration_s,
                 1.0 / gesture.duration_s,
                 gesture.frames.len(),
                 definition.closure
-            );
-            match definition.periodicity {
-                Some(periodicity) => println!(", autocorrelation {periodicity:.2}"),
-                None => println!(),
-            }
+            ));
         }
-        GestureKind::NonCyclic => println!(
+        GestureKind::NonCyclic => say(format_args!(
             "`{}`: rest to extreme in {:.3} s, {} frames",
             gesture.name,
             gesture.duration_s,
             gesture.frames.len()
-        ),
+        )),
     }
 }
 
@@ -312,10 +311,10 @@ fn write_estimates(
 fn list(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
     let set = load(path)?;
     if !json {
-        println!(
+        say(format_args!(
             "{:<16} {:<10} {:>10} {:>7}  source",
             "gesture", "kind", "duration_s", "frames"
-        );
+        ));
     }
     for gesture in &set.gestures {
         if json {
@@ -324,16 +323,16 @@ fn list(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
                 "duration_s": gesture.duration_s, "frames": gesture.frames.len(),
                 "source": gesture.source,
             });
-            println!("{object}");
+            say(format_args!("{object}"));
         } else {
-            println!(
+            say(format_args!(
                 "{:<16} {:<10} {:>10.3} {:>7}  {}",
                 gesture.name,
                 gesture.kind.name(),
                 gesture.duration_s,
                 gesture.frames.len(),
                 gesture.source
-            );
+            ));
         }
     }
     Ok(ExitStatus::Done)
@@ -348,10 +347,10 @@ fn check(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
         ))
     })?;
     if !json {
-        println!(
+        say(format_args!(
             "{:<16} {:<16} {:>7} {:>8}  ",
             "plane of", "shown", "mean", "largest"
-        );
+        ));
     }
     for response in table {
         let plane = &set.gestures[response.gesture].name;
@@ -362,14 +361,14 @@ fn check(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
                 "gesture": plane, "shown": shown, "mean": response.mean,
                 "largest": response.largest, "confusable": confusable,
             });
-            println!("{object}");
+            say(format_args!("{object}"));
         } else {
-            println!(
+            say(format_args!(
                 "{plane:<16} {shown:<16} {:>7.3} {:>8.3}  {}",
                 response.mean,
                 response.largest,
                 if confusable { "may be confused" } else { "" }
-            );
+            ));
         }
     }
     Ok(ExitStatus::Done)

@@ -39,6 +39,12 @@ enum Command {
     Sim(sim::SimArgs),
 }
 
+/// Prints a line for the reader. A reader that has gone away (`| head`) is no failure.
+fn say(line: std::fmt::Arguments) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
 /// Parses the command line, runs the command, prints its failure and returns its exit code.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();

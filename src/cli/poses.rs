@@ -1,6 +1,6 @@
 //! `handwave poses`: bring recordings into the pose stream, look at them, compose performances.
 
-use super::{ExitStatus, Failure};
+use super::{ExitStatus, Failure, say};
 use crate::pose::{FaultCounts, PoseError, Recording, compose, leap};
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
@@ -92,13 +92,13 @@ fn import(file: &Path, out: &Path, joints: bool) -> Result<ExitStatus, Failure> 
 fn write(recording: &Recording, out: &Path) -> Result<ExitStatus, Failure> {
     recording.write(out).map_err(Failure::input)?;
     let (from, to) = recording.span_s();
-    println!(
+    say(format_args!(
         "{}: {} samples, {} points, {:.3} s",
         out.display(),
         recording.samples.len(),
         recording.header.points.len(),
         to - from
-    );
+    ));
     Ok(ExitStatus::Done)
 }
 
@@ -144,10 +144,10 @@ fn info(file: &Path, json: bool) -> Result<ExitStatus, Failure> {
             "channels": recording.header.channels,
             "dropped": dropped.by_reason().into_iter().collect::<BTreeMap<_, _>>(),
         });
-        println!("{object}");
+        say(format_args!("{object}"));
         return Ok(ExitStatus::Done);
     }
-    println!(
+    say(format_args!(
         "{}: {} samples, {}-D, {from:.3} to {to:.3} s, {rate:.1} Hz (steps {:.1} / {:.1} / {:.1} ms min / median / max)",
         file.display(),
         recording.samples.len(),
@@ -155,23 +155,26 @@ fn info(file: &Path, json: bool) -> Result<ExitStatus, Failure> {
         step(0.0),
         step(0.5),
         step(1.0)
-    );
-    println!("dropped: {dropped}");
-    println!(
+    ));
+    say(format_args!("dropped: {dropped}"));
+    say(format_args!(
         "{:<20} {:>6}  {:>26}  {:>20}",
         "point", "seen", "mean x y z [mm]", "range x y z [mm]"
-    );
+    ));
     for point in &points {
         let [x, y, z] = point.mean.map(|v| 1e3 * v);
         let [dx, dy, dz] = point.range.map(|v| 1e3 * v);
-        println!(
+        say(format_args!(
             "{:<20} {:>5.1}%  {x:>8.1} {y:>8.1} {z:>8.1}  {dx:>6.1} {dy:>6.1} {dz:>6.1}",
             point.name,
             100.0 * point.seen
-        );
+        ));
     }
     if !recording.header.channels.is_empty() {
-        println!("channels: {}", recording.header.channels.join(", "));
+        say(format_args!(
+            "channels: {}",
+            recording.header.channels.join(", ")
+        ));
     }
     Ok(ExitStatus::Done)
 }

@@ -3,7 +3,7 @@
 use crate::config::Character;
 use crate::live::control::Ending;
 use crate::live::session::Report;
-use crate::live::stats::{FaultKind, Percentiles};
+use crate::live::stats::{FaultKind, Percentiles, ServoFault};
 use serde_json::{Value, json};
 
 /// The summary as one JSON object.
@@ -108,35 +108,25 @@ pub fn to_text(report: &Report, character: &Character) -> String {
     text
 }
 
-/// One line per servo and kind of fault, with the first few times.
+/// One line per servo and kind of fault, with the first few times; faults that struck all servos at
+/// once are those of the line, not of a servo, and get one line together.
 fn fault_lines(report: &Report, character: &Character) -> String {
-    const TIMES: usize = 3;
     let stats = &report.stats;
+    let at_once = |fault: &ServoFault| {
+        let same = |f: &&ServoFault| f.kind == fault.kind && f.from_s == fault.from_s;
+        character.joints.len() > 1
+            && stats.faults.iter().filter(same).count() == character.joints.len()
+    };
+    let (whole, single): (Vec<&ServoFault>, Vec<&ServoFault>) =
+        stats.faults.iter().partition(|f| at_once(f));
     let mut text = String::new();
-    for (joint, name) in character.joints.iter().enumerate() {
-        for kind in FaultKind::ALL {
-            let times: Vec<String> = stats
-                .faults
-                .iter()
-                .filter(|f| f.joint == joint && f.kind == kind)
-                .map(|f| match f.to_s {
-                    Some(to) => format!("{:.3}..{to:.3} s", f.from_s),
-                    None => format!("{:.3} s to the end", f.from_s),
-                })
-                .collect();
-            if times.is_empty() {
-                continue;
-            }
-            let more = match times.len().saturating_sub(TIMES) {
-                0 => String::new(),
-                n => format!(" and {n} more times"),
-            };
-            text += &format!(
-                "fault         servo {} (joint {name}) {} {}{more}\n",
-                character.servos[joint].id,
-                kind.as_str(),
-                times[..times.len().min(TIMES)].join(", "),
-            );
+    for kind in FaultKind::ALL {
+        let first_joint = whole.iter().filter(|f| f.kind == kind && f.joint == 0);
+        text += &fault_line("all servos", kind, first_joint);
+        for (joint, name) in character.joints.iter().enumerate() {
+            let who = format!("servo {} (joint {name})", character.servos[joint].id);
+            let own = single.iter().filter(|f| f.kind == kind && f.joint == joint);
+            text += &fault_line(&who, kind, own);
         }
     }
     if stats.more_faults > 0 {
@@ -146,6 +136,27 @@ fn fault_lines(report: &Report, character: &Character) -> String {
         );
     }
     text
+}
+
+fn fault_line<'a>(
+    who: &str,
+    kind: FaultKind,
+    faults: impl Iterator<Item = &'a &'a ServoFault>,
+) -> String {
+    const TIMES: usize = 3;
+    let times: Vec<String> = faults
+        .map(|f| match f.to_s {
+            Some(to) => format!("{:.3}..{to:.3} s", f.from_s),
+            None => format!("{:.3} s to the end", f.from_s),
+        })
+        .collect();
+    let more = match times.len().saturating_sub(TIMES) {
+        _ if times.is_empty() => return String::new(),
+        0 => String::new(),
+        n => format!(" and {n} more times"),
+    };
+    let listed = times[..times.len().min(TIMES)].join(", ");
+    format!("fault         {who} {} {listed}{more}\n", kind.as_str())
 }
 
 fn reasons(report: &Report) -> String {

@@ -92,6 +92,13 @@ pub struct ClassParts {
     examples: Vec<Example>,
 }
 
+impl ClassParts {
+    /// Names of the example clips, in the order of the class's weights.
+    pub fn clip_names(&self) -> Vec<String> {
+        self.examples.iter().map(|e| e.clip.name.clone()).collect()
+    }
+}
+
 #[derive(Clone, Debug)]
 struct LayerParts {
     name: String,

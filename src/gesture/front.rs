@@ -87,7 +87,7 @@ enum Reading {
 
 /// From pose samples to gesture estimates.
 ///
-/// [`FrontEnd::push`] takes about 40 microseconds per cyclic gesture (110 Hz, one core of a cloud
+/// [`FrontEnd::push`] takes about 50 microseconds per cyclic gesture (108 Hz, one core of a cloud
 /// server) and allocates nothing.
 pub struct FrontEnd {
     fit: GlobalFit,

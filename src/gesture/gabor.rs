@@ -5,8 +5,8 @@
 //! - Responses are normalised by the sum of the window, so a pure wave gives its own amplitude.
 //!   Every sample weighs as the time it stands for (trapezoidal rule, at most 0.1 s), so bursts and
 //!   dropped samples do not count twice or leave dents.
-//! - Just after the start the window is not full; the response then counts only for the covered
-//!   share, which makes amplitude grow from zero and keeps slow filters from guessing.
+//! - Just after the start the window is not full; the response then counts only for the square of
+//!   the covered share, which makes amplitude grow from zero and keeps slow filters from guessing.
 //! - The 50 periods are spaced logarithmically; the peak is refined by a parabola over the
 //!   logarithm of frequency and the filter is evaluated once more there.
 //! - Both senses of rotation are searched; the other sense must win by 10 %, because a gesture that
@@ -223,7 +223,8 @@ impl GaborEstimator {
         } else {
             self.kernel.coverage(covered) / self.kernel.coverage(possible)
         };
-        let scale = share / total;
+        // Squared: well under a period, a held pose and a wave look alike.
+        let scale = share * share / total;
         // A sample at lag l had the phase now minus 2 pi f l: turning it forward by that angle
         // brings it to now. exp(+i u) z for the forward sense, exp(-i u) z for the backward one.
         Response {
@@ -304,8 +305,9 @@ fn length(z: [f64; 2]) -> f64 {
 /// Reciprocals of the variances, brought to the sum 2, with both ends made firm.
 ///
 /// On a loop the two variances take turns and a one-sided window does not quite average them out;
-/// on a line a trace of the blind component remains. So a mild imbalance (up to 1.4 : 0.6) counts
-/// as none and a strong one (from 1.9 : 0.1) as complete, linear between.
+/// on a line a trace of the blind component remains. So a mild imbalance (up to 1.3 : 0.7) counts
+/// as none and a strong one (from 1.5 : 0.5, half of what a perfect line has) as complete, linear
+/// between.
 fn component_weights(variance: [f64; 2]) -> [f64; 2] {
     let [vr, vi] = variance;
     let sum = vr + vi;
@@ -313,7 +315,7 @@ fn component_weights(variance: [f64; 2]) -> [f64; 2] {
         return [1.0, 1.0];
     }
     let lean = (vi - vr) / sum;
-    let firm = ((lean.abs() - 0.4) / 0.5).clamp(0.0, 1.0).copysign(lean);
+    let firm = ((lean.abs() - 0.3) / 0.2).clamp(0.0, 1.0).copysign(lean);
     [1.0 + firm, 1.0 - firm]
 }
 

@@ -9,6 +9,8 @@ use std::f64::consts::TAU;
 const NEIGHBOUR_FRAMES: usize = 64;
 /// Nearest frames that are asked (the thesis's n).
 const NEIGHBOURS: usize = 10;
+/// Variance that ten neighbours on a loop may have: with it a loop never looks like a line.
+const LOOP_SPREAD: f64 = 0.3;
 /// Weight of every gesture's frames together in the regression, so that neither the tracker's rate
 /// nor a gesture's length decides how much it counts.
 const BLOCK_WEIGHT: f64 = 100.0;
@@ -39,7 +41,11 @@ impl References {
     pub fn new(set: &GestureSet) -> Result<Self, String> {
         let mut fit = GlobalFit::new(&set.header, &set.reference, &set.global)?;
         let frames = || set.gestures.iter().flat_map(|gesture| &gesture.frames);
-        fit.weigh(frames().map(Vec::as_slice));
+        // Twice: the first weights come from a fit to which the gestures themselves still belonged.
+        // Not oftener: the weights would gather on whichever point moves least.
+        for _ in 0..2 {
+            fit.weigh(frames().map(Vec::as_slice));
+        }
         let mut out = vec![[0.0; 3]; set.header.points.len()];
         let mut flat = |frame: &Vec<[f64; 3]>| {
             fit.remove(frame, None, &mut out);
@@ -152,6 +158,8 @@ pub struct Plane {
     /// Reference frames relative to their mean, for the nearest-neighbour test.
     neighbours: Vec<(DVector<f64>, [f64; 2])>,
     mean: DVector<f64>,
+    /// Variance per component, averaged over the reference.
+    usual_variance: [f64; 2],
 }
 
 impl Plane {
@@ -208,10 +216,18 @@ impl Plane {
             bias: [0, 1].map(|c| solution[(dim, c)]),
             neighbours: Vec::new(),
             mean: mean.clone(),
+            usual_variance: [1.0, 1.0],
         };
         plane.calibrate(&references.local[index], &own);
         if gesture.kind == GestureKind::Cyclic {
             plane.neighbours = evenly(set, references, index, &own);
+            let mut sum = [0.0; 2];
+            for (frame, _) in &plane.neighbours {
+                let variance = plane.variance_of(frame.iter().copied());
+                sum[0] += variance[0] / NEIGHBOUR_FRAMES as f64;
+                sum[1] += variance[1] / NEIGHBOUR_FRAMES as f64;
+            }
+            plane.usual_variance = sum;
         }
         plane
     }
@@ -257,22 +273,31 @@ impl Plane {
     /// The place of a flat pose (x, y, z per point, metres, without global motion) on the plane.
     ///
     /// Allocates nothing. The variance per component is the mean squared distance between the
-    /// targets of the ten nearest reference frames ("Under-constrained input").
+    /// targets of the ten nearest reference frames ("Under-constrained input"), half of this pose,
+    /// half averaged over the whole reference, above the spread that neighbours have on any loop:
+    /// being a line is a property of the gesture, and a short window does not see all of it.
     pub fn apply(&self, pose: &[f64], with_variance: bool) -> PlanePoint {
-        let z = self.linear(pose);
         let mut point = PlanePoint {
-            z,
+            z: self.linear(pose),
             variance: [1.0, 1.0],
         };
-        if !with_variance || self.neighbours.len() <= NEIGHBOURS {
-            return point;
+        if with_variance && !self.neighbours.is_empty() {
+            let relative = pose.iter().zip(self.mean.iter()).map(|(v, m)| v - m);
+            let live = self.variance_of(relative);
+            let usual = self.usual_variance;
+            point.variance =
+                [0, 1].map(|component| LOOP_SPREAD + 0.5 * (live[component] + usual[component]));
         }
+        point
+    }
+
+    /// Mean squared pairwise distance, per component, of the targets of the nearest frames.
+    fn variance_of(&self, relative: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
         let mut nearest = [(f64::INFINITY, [0.0; 2]); NEIGHBOURS];
         for (frame, target) in &self.neighbours {
             let mut distance = 0.0;
-            for (axis, value) in pose.iter().enumerate().take(self.mean.len()) {
-                let d = value - self.mean[axis] - frame[axis];
-                distance += d * d;
+            for (value, frame) in relative.clone().zip(frame.iter()) {
+                distance += (value - frame) * (value - frame);
             }
             if distance < nearest[NEIGHBOURS - 1].0 {
                 let at = nearest.partition_point(|(other, _)| *other <= distance);
@@ -280,7 +305,7 @@ impl Plane {
                 nearest[at] = (distance, *target);
             }
         }
-        for component in 0..2 {
+        [0, 1].map(|component| {
             let (mut sum, mut square) = (0.0, 0.0);
             for (_, target) in &nearest {
                 sum += target[component];
@@ -288,8 +313,7 @@ impl Plane {
             }
             let n = NEIGHBOURS as f64;
             // The mean squared distance over all pairs is 2 n / (n - 1) times the variance.
-            point.variance[component] = (2.0 * (square - sum * sum / n) / (n - 1.0)).max(1e-6);
-        }
-        point
+            2.0 * (square - sum * sum / n).max(0.0) / (n - 1.0)
+        })
     }
 }

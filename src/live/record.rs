@@ -24,6 +24,8 @@ pub struct CycleRecord {
     pub gestures: Vec<GestureEstimate>,
     /// What each class did.
     pub played: Vec<Played>,
+    /// Blend weight of every clip of the class being played.
+    pub clips: Vec<f64>,
     /// Weight of each layer.
     pub layers: Vec<f64>,
     /// Class being played.
@@ -71,6 +73,13 @@ impl CycleRecord {
         refill(&mut self.states, states.iter().copied());
         refill(&mut self.gestures, puppet.estimates().iter().copied());
         refill(&mut self.played, animator.played().iter().copied());
+        refill(
+            &mut self.clips,
+            animator.classes()[animator.active()]
+                .weights()
+                .iter()
+                .copied(),
+        );
         refill(
             &mut self.layers,
             animator.layers().iter().map(|l| l.weight()),

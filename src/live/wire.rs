@@ -2,9 +2,9 @@
 
 use crate::base::{Clock, Time};
 use crate::bus::dynamixel::{
-    ChainOptions, Client, DynamixelChain, Master, MasterOptions, SpecError,
+    self, ChainOptions, Client, DynamixelChain, Master, MasterOptions, SpecError,
 };
-use crate::bus::{BusAddress, DynamixelBackend, Port, PortError, SerialPort, ServoBus};
+use crate::bus::{BusAddress, PortError, ServoBus};
 use crate::config::Character;
 use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
 use std::sync::Arc;
@@ -65,13 +65,16 @@ pub fn open(
         BusAddress::Sim => {
             let line = simulated_line(character)?;
             let port = SimPort::new(line.clone(), clock, character.sim_baud);
-            (own_client(Box::new(port), rate_hz), Some(line))
+            (
+                Box::new(Master::new(Box::new(port), MasterOptions::default())),
+                Some(line),
+            )
         }
         BusAddress::Dynamixel {
             path,
             baud,
             backend,
-        } => (serial_client(path, *baud, *backend, clock, rate_hz)?, None),
+        } => (dynamixel::open(path, *baud, *backend, clock)?, None),
     };
     let chain = DynamixelChain::new(client, character.servos.clone(), options)?;
     Ok(Wire {
@@ -90,55 +93,6 @@ fn simulated_line(character: &Character) -> Result<SharedLine, WireError> {
         },
     )?;
     Ok(SharedLine::new(line))
-}
-
-#[cfg(feature = "dxl-serial2")]
-fn serial_client(
-    path: &str,
-    baud: u32,
-    backend: DynamixelBackend,
-    clock: Arc<dyn Clock>,
-    rate_hz: f64,
-) -> Result<Box<dyn Client>, WireError> {
-    Ok(match backend {
-        DynamixelBackend::Handwave => {
-            own_client(Box::new(SerialPort::open(path, baud, clock)?), rate_hz)
-        }
-        DynamixelBackend::Dynamixel2 => Box::new(crate::bus::dynamixel::Dynamixel2Client::open(
-            path, baud, clock,
-        )?),
-    })
-}
-
-#[cfg(not(feature = "dxl-serial2"))]
-fn serial_client(
-    path: &str,
-    baud: u32,
-    backend: DynamixelBackend,
-    clock: Arc<dyn Clock>,
-    rate_hz: f64,
-) -> Result<Box<dyn Client>, WireError> {
-    match backend {
-        DynamixelBackend::Handwave => Ok(own_client(
-            Box::new(SerialPort::open(path, baud, clock)?),
-            rate_hz,
-        )),
-        DynamixelBackend::Dynamixel2 => Err(WireError::NoBackend),
-    }
-}
-
-/// Our own master. A late answer is waited for up to a fifth of the cycle beyond its time on the wire
-/// (at most 1 ms): less takes a busy system for a silent servo, more leaves no time to ask again.
-fn own_client(port: Box<dyn Port>, rate_hz: f64) -> Box<dyn Client> {
-    let allowance = Duration::from_secs_f64(0.2 / rate_hz).min(Duration::from_millis(1));
-    let options = MasterOptions::default();
-    Box::new(Master::new(
-        port,
-        MasterOptions {
-            min_allowance: allowance.min(options.max_allowance),
-            ..options
-        },
-    ))
 }
 
 /// Injects `faults`, whose times count from `start`. Their servos were checked when they were parsed.

@@ -219,11 +219,6 @@ impl MotionClass {
         &self.weights
     }
 
-    /// Names of the examples, in the order of [`MotionClass::weights`].
-    pub fn clip_names(&self) -> impl Iterator<Item = &str> {
-        self.examples.iter().map(|e| e.clip.name.as_str())
-    }
-
     /// Pose at rest: amplitude or progression zero, into `out`.
     pub fn rest_pose(&mut self, space: &dyn PoseSpace, out: &mut [f64]) {
         let (lowest, _) = self.weights_map.frequencies();

@@ -36,21 +36,25 @@
 //! ```
 //!
 //! What keeps a composed stream like a tracked one:
-//! - **Noise.** Each recording is split into a smooth part (Gaussian in time, deviation 20 ms) and
-//!   the residual, which is the sensor's noise. Tempo, size, holds and joins act on the smooth part
+//! - **Noise.** Each recording is split into a smooth part (Gaussian in time, deviation 12 ms) and
+//!   the residual, which is the sensor's noise; what sticks out of the noise (a strike too quick
+//!   for the Gaussian) is cut back to four times its usual size. Tempo, size, holds and joins act on the smooth part
 //!   only; the residual is played at the recorded rate on top, row after row, all points together,
 //!   round and round.
 //! - **Time steps.** The steps are the recording's own, in their order, dropped frames included.
 //! - **Joins.** The segment before runs on while the new one starts; a smooth step blends from one to
-//!   the other. A loop that follows a loop over the same stretch takes over its phase.
+//!   the other. Turning and shape are blended apart, as a hand turns between two postures without
+//!   shrinking half-way. A loop that follows a loop over the same stretch takes over its phase.
 
-use super::{PoseError, PoseHeader, PoseSample, Recording};
+use super::{GlobalFit, GlobalOptions, PoseError, PoseHeader, PoseSample, Recording};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Deviation of the Gaussian that splits a recording into motion and noise, seconds.
-const SPLIT_SIGMA_S: f64 = 0.02;
+const SPLIT_SIGMA_S: f64 = 0.012;
+/// Residuals beyond this many usual sizes (median of the modulus, per coordinate) are motion.
+const NOISE_REACH: f64 = 4.0;
 /// Shortest step of a composed stream: what its time stamps can show.
 const SHORTEST_STEP_S: f64 = 2e-4;
 /// Longest composed stream in seconds.
@@ -130,7 +134,7 @@ impl Source {
             scale(&mut pose, 1.0 / total);
             smooth.push(pose);
         }
-        let residual = rows
+        let mut residual: Vec<Pose> = rows
             .iter()
             .zip(&smooth)
             .map(|(row, smooth)| {
@@ -139,6 +143,16 @@ impl Source {
                 rest
             })
             .collect();
+        for point in 0..recording.header.points.len() {
+            for axis in 0..3 {
+                let mut sizes: Vec<f64> = residual.iter().map(|r| r[point][axis].abs()).collect();
+                sizes.sort_by(f64::total_cmp);
+                let reach = NOISE_REACH * sizes[sizes.len() / 2];
+                for row in &mut residual {
+                    row[point][axis] = row[point][axis].clamp(-reach, reach);
+                }
+            }
+        }
         Ok(Self {
             times,
             smooth,
@@ -193,6 +207,31 @@ fn mix(a: &[[f64; 3]], b: &[[f64; 3]], u: f64) -> Pose {
     let mut pose = a.to_vec();
     scale(&mut pose, 1.0 - u);
     add(&mut pose, b, u);
+    pose
+}
+
+/// The pose a share `u` of the way from `a` to `b`: place, yaw and shape each go their own way.
+fn blend(header: &PoseHeader, a: &[[f64; 3]], b: &[[f64; 3]], u: f64) -> Pose {
+    let fit = match GlobalFit::new(header, a, &GlobalOptions::default()) {
+        Ok(fit) if header.points.len() >= 3 => fit,
+        // One or two points are no body that could turn.
+        _ => return mix(a, b, u),
+    };
+    let mut turned = b.to_vec();
+    let motion = fit.remove(b, None, &mut turned);
+    // `turned` lies on `a` but for its shape; where b's height was kept it still has it.
+    let mut pose = mix(a, &turned, u);
+    let body = fit.body(&pose);
+    let (sin, cos) = (u * motion.yaw_rad).sin_cos();
+    let rise = u * fit.removed_rise(b);
+    for place in &mut pose {
+        let (x, z) = (place[0] - body[0], place[2] - body[2]);
+        *place = [
+            x * cos + z * sin + body[0] + u * motion.x_m,
+            place[1] + rise,
+            z * cos - x * sin + body[2] + u * motion.z_m,
+        ];
+    }
     pose
 }
 
@@ -314,10 +353,8 @@ pub fn compose(path: &Path) -> Result<Recording, PoseError> {
     };
     header.channels.clear();
     let segments = segments_of(&recipe, &sources, &wrong)?;
-    Ok(Recording {
-        header,
-        samples: play(&segments, &sources, recipe.seed),
-    })
+    let samples = play(&header, &segments, &sources, recipe.seed);
+    Ok(Recording { header, samples })
 }
 
 /// Checks the segments' values and works out centres, lengths and phases.
@@ -418,7 +455,12 @@ fn segments_of(
 }
 
 /// Plays the segments one after the other.
-fn play(segments: &[Segment], sources: &[Source], seed: u64) -> Vec<PoseSample> {
+fn play(
+    header: &PoseHeader,
+    segments: &[Segment],
+    sources: &[Source],
+    seed: u64,
+) -> Vec<PoseSample> {
     let mut random = SplitMix(seed);
     let mut samples: Vec<PoseSample> = Vec::new();
     let (mut t, mut begin) = (0.0, 0.0);
@@ -433,7 +475,7 @@ fn play(segments: &[Segment], sources: &[Source], seed: u64) -> Vec<PoseSample> 
             let mut pose = segment.at(sources, u);
             if let Some(before) = before.filter(|_| u < segment.join) {
                 let last = before.at(sources, before.duration + u);
-                pose = mix(&last, &pose, smooth_step(u / segment.join));
+                pose = blend(header, &last, &pose, smooth_step(u / segment.join));
             }
             add(&mut pose, &source.residual[row + 1], 1.0);
             samples.push(PoseSample {

@@ -114,6 +114,55 @@ impl GlobalFit {
         }
     }
 
+    /// Place, reference place and weight of every point that is seen.
+    fn rows<'a>(
+        &'a self,
+        points: &'a [[f64; 3]],
+        seen: Option<&'a [bool]>,
+    ) -> impl Iterator<Item = (&'a [f64; 3], &'a [f64; 3], f64)> {
+        (points.iter().zip(&self.reference))
+            .zip(&self.weights)
+            .enumerate()
+            .filter(move |(index, _)| seen.is_none_or(|seen| seen.get(*index) == Some(&true)))
+            .map(|(_, ((place, reference), weight))| (place, reference, *weight))
+    }
+
+    /// The body, in the pose and in the reference: the anchor, else the centroid of what is seen.
+    fn bodies(&self, points: &[[f64; 3]], seen: Option<&[bool]>) -> ([f64; 3], [f64; 3]) {
+        if let Some(index) = self.anchor
+            && seen.is_none_or(|seen| seen.get(index) == Some(&true))
+            && let (Some(body), Some(home)) = (points.get(index), self.reference.get(index))
+        {
+            return (*body, *home);
+        }
+        let (mut body, mut home, mut total) = ([0.0; 3], [0.0; 3], 0.0);
+        for (place, reference, weight) in self.rows(points, seen) {
+            total += weight;
+            for axis in 0..3 {
+                body[axis] += weight * place[axis];
+                home[axis] += weight * reference[axis];
+            }
+        }
+        if total > 0.0 {
+            for axis in 0..3 {
+                body[axis] /= total;
+                home[axis] /= total;
+            }
+        }
+        (body, home)
+    }
+
+    /// Where the body of a fully seen pose is: the anchor, else the weighted centroid, metres.
+    pub fn body(&self, points: &[[f64; 3]]) -> [f64; 3] {
+        self.bodies(points, None).0
+    }
+
+    /// How much higher than in the reference the body is, as far as height is removed, metres.
+    pub fn removed_rise(&self, points: &[[f64; 3]]) -> f64 {
+        let (body, home) = self.bodies(points, None);
+        if self.height { body[1] - home[1] } else { 0.0 }
+    }
+
     /// Writes the pose without its global motion to `out` and returns what was removed.
     ///
     /// `points` and `out` hold one place per point; points whose `seen` is false do not take part
@@ -124,42 +173,11 @@ impl GlobalFit {
         seen: Option<&[bool]>,
         out: &mut [[f64; 3]],
     ) -> GlobalMotion {
-        let is_seen = |index: usize| seen.is_none_or(|seen| seen.get(index) == Some(&true));
-        let rows = || {
-            (points.iter().zip(&self.reference))
-                .zip(&self.weights)
-                .enumerate()
-                .filter(|(index, _)| is_seen(*index))
-                .map(|(_, ((place, reference), weight))| (place, reference, *weight))
-        };
-        // The body: the anchor, else the centroid of what is seen, in the pose and in the reference.
-        let (mut body, mut home) = ([0.0; 3], [0.0; 3]);
-        match self.anchor.filter(|index| is_seen(*index)) {
-            Some(index) if index < points.len() => {
-                body = points[index];
-                home = self.reference[index];
-            }
-            _ => {
-                let mut total = 0.0;
-                for (place, reference, weight) in rows() {
-                    total += weight;
-                    for axis in 0..3 {
-                        body[axis] += weight * place[axis];
-                        home[axis] += weight * reference[axis];
-                    }
-                }
-                if total > 0.0 {
-                    for axis in 0..3 {
-                        body[axis] /= total;
-                        home[axis] /= total;
-                    }
-                }
-            }
-        }
+        let (body, home) = self.bodies(points, seen);
         let mut yaw = 0.0;
         if self.yaw {
             let (mut sine, mut cosine) = (0.0, 0.0);
-            for (place, reference, weight) in rows() {
+            for (place, reference, weight) in self.rows(points, seen) {
                 let (px, pz) = (place[0] - body[0], place[2] - body[2]);
                 let (qx, qz) = (reference[0] - home[0], reference[2] - home[2]);
                 sine += weight * (px * qz - pz * qx);

@@ -117,7 +117,12 @@ fn motion_lines(names: &Names, record: &CycleRecord) -> Vec<Line<'static>> {
             ))
             .yellow(),
         ]),
-        None => Line::from(class(record.active)).green().bold(),
+        None => Line::from(vec![
+            Span::from(format!("{}  ", class(record.active)))
+                .green()
+                .bold(),
+            Span::from(clip_shares(names, record)).green(),
+        ]),
     }];
     for (node, played) in record.played.iter().enumerate() {
         let shown = node == record.active || record.transition.is_some_and(|(t, _)| t.to == node);
@@ -156,6 +161,24 @@ fn motion_lines(names: &Names, record: &CycleRecord) -> Vec<Line<'static>> {
         record.root.x_m.hypot(record.root.y_m)
     )));
     lines
+}
+
+/// The clips being blended, largest share first: `walk_long 62 %  trot_long 38 %`.
+fn clip_shares(names: &Names, record: &CycleRecord) -> String {
+    let Some(clips) = names.clips.get(record.active) else {
+        return String::new();
+    };
+    let mut shares: Vec<(&String, f64)> = clips
+        .iter()
+        .zip(record.clips.iter().copied())
+        .filter(|(_, weight)| *weight > 0.005)
+        .collect();
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let texts: Vec<String> = shares
+        .iter()
+        .map(|(name, weight)| format!("{name} {:.0} %", weight * 100.0))
+        .collect();
+    texts.join("  ")
 }
 
 fn joint_lines(names: &Names, record: &CycleRecord, width: u16) -> Vec<Line<'static>> {

@@ -18,6 +18,8 @@ pub struct Names {
     pub gestures: Vec<String>,
     /// Classes.
     pub classes: Vec<String>,
+    /// Clips of each class.
+    pub clips: Vec<Vec<String>>,
     /// Layers.
     pub layers: Vec<String>,
     /// Position limits per joint, rad.
@@ -43,6 +45,7 @@ impl Names {
                 .map(|g| g.name.clone())
                 .collect(),
             classes: character.classes.iter().map(|c| c.name.clone()).collect(),
+            clips: character.classes.iter().map(|c| c.clip_names()).collect(),
             layers: character.layer_names(),
             limits: character
                 .limits

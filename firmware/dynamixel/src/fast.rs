@@ -6,6 +6,7 @@
 //! The first servo sends the prefix with the length of all, each servo its block when it has heard
 //! its predecessor. Each block's checksum covers every byte since the first FF, earlier checksums
 //! included; so the last one is that of the frame, and the blocks before the first bad one are good.
+//! Behind a bad one the check can be taken up again from its checksum, see [`Blocks::skip_block`].
 //! The frame is not stuffed.
 
 use crate::BROADCAST_ID;
@@ -79,7 +80,7 @@ pub struct Block<'a> {
     pub data: &'a [u8],
 }
 
-/// Why a block, and every block after it, cannot be used.
+/// Why a block cannot be used.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 pub enum BlockError {
     /// The block is not complete.
@@ -154,7 +155,8 @@ impl<'a> Blocks<'a> {
 
     /// The next block, that of servo `id` with `data_len` bytes of data.
     ///
-    /// After an error the position stays: the same call on more bytes may succeed.
+    /// After an error the position stays: the same call on more bytes may succeed, or
+    /// [`skip_block`](Self::skip_block) leads past it.
     pub fn next_block(&mut self, id: u8, data_len: usize) -> Result<Block<'a>, BlockError> {
         let rest = &self.bytes[self.position..];
         let block_len = data_len.saturating_add(BLOCK_OVERHEAD);
@@ -188,5 +190,21 @@ impl<'a> Blocks<'a> {
             error: ErrorCode::from_byte(covered[0]),
             data: &covered[2..],
         })
+    }
+
+    /// Passes over a damaged block with `data_len` bytes of data; false when it is not complete.
+    ///
+    /// The checksum at its end, if that is intact, is what the sender's sum stood at: from there the
+    /// following blocks check as strictly as ever. If it is not, the next block fails too.
+    pub fn skip_block(&mut self, data_len: usize) -> bool {
+        let rest = &self.bytes[self.position..];
+        let block_len = data_len.saturating_add(BLOCK_OVERHEAD);
+        let Some([.., low, high]) = rest.get(..block_len) else {
+            return false;
+        };
+        self.crc = Crc::from_value(u16::from_le_bytes([*low, *high]));
+        self.crc.update(&[*low, *high]);
+        self.position += block_len;
+        true
     }
 }

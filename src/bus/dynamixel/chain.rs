@@ -27,7 +27,7 @@ pub struct ChainOptions {
     pub profile_acceleration: u32,
     /// After how long without any answer the bus counts as lost. Default 500 ms.
     pub lost_after: Duration,
-    /// How often a silent servo is asked again. Default 250 ms.
+    /// How often a servo that stays silent is asked again. At first it is asked more often. Default 250 ms.
     pub retry_every: Duration,
     /// Bus time of a control cycle: within it the servos behind a silent one are asked a second time.
     /// Default 5 ms.
@@ -78,6 +78,8 @@ pub(super) struct Servo {
     pub(super) goal_pulse: f64,
     /// When a silent servo is asked again.
     pub(super) retry_at: Time,
+    /// The time from that to the next try; doubles up to [`ChainOptions::retry_every`].
+    pub(super) retry_after: Duration,
     /// In this cycle: its state is new.
     pub(super) fresh: bool,
     /// In this cycle: it was its turn and nothing came.
@@ -143,6 +145,7 @@ impl DynamixelChain {
                     firmware: 0,
                     armed: false,
                     retry_at: now,
+                    retry_after: Duration::ZERO,
                     fresh: false,
                     mute: false,
                 })
@@ -362,7 +365,8 @@ impl ServoBus for DynamixelChain {
         let now = self.client.now();
         let servo = &mut self.servos[joint];
         servo.link = Link::Silent;
-        servo.retry_at = now + self.options.retry_every;
+        servo.retry_after = self.options.retry_every;
+        servo.retry_at = now + servo.retry_after;
         Ok(())
     }
 

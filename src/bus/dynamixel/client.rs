@@ -121,6 +121,11 @@ pub trait Client: Send {
     fn set_return_delay(&mut self, delay: Duration);
     /// How long beyond its wire time an answer is waited for at present.
     fn patience(&self) -> Duration;
+    /// Tells when the control cycle ends, or that none is on. Within a cycle a late answer is waited
+    /// for as long as the servos behind it could still be asked again: that time has no other use.
+    fn set_cycle_end(&mut self, end: Option<Time>) {
+        let _ = end;
+    }
 
     /// Asks one servo who it is.
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError>;

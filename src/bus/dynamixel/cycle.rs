@@ -50,7 +50,11 @@ impl DynamixelChain {
 
         self.send_goals(targets_rad, step.as_secs_f64())?;
         report.goal_sent_us = micros(self.client.now().saturating_since(begin));
-        self.read_states(states, &mut report, begin)?;
+        self.client
+            .set_cycle_end(Some(begin + self.options.cycle_budget));
+        let read = self.read_states(states, &mut report, begin);
+        self.client.set_cycle_end(None);
+        read?;
         self.retry_one(begin)?;
 
         let now = self.client.now();
@@ -257,8 +261,9 @@ impl DynamixelChain {
         let now = self.client.now();
         for servo in self.servos.iter_mut().filter(|servo| servo.mute) {
             servo.link = Link::Silent;
-            // The first time at once: a single lost answer should not cost a quarter of a second.
+            // The first time in the next cycle: a single lost answer should not cost a quarter of a second.
             servo.retry_at = now;
+            servo.retry_after = self.options.retry_every / 16;
         }
     }
 }

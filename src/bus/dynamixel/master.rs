@@ -5,10 +5,10 @@
 //! from how late answers really are, because a fixed one is either too long for a control cycle with
 //! a silent servo or too short for a USB adapter.
 
+use super::allowance::Allowance;
 use super::client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
 use crate::base::Time;
 use crate::bus::port::Port;
-use handwave_dynamixel::fast::{self, Blocks};
 use handwave_dynamixel::lists::encode_sync_write;
 use handwave_dynamixel::{
     BROADCAST_ID, BufferTooSmall, ErrorCode, FrameParser, Instruction, MAX_ID, Status, wire,
@@ -18,7 +18,7 @@ use std::time::Duration;
 /// Longest frame received one by one, and longest frame sent.
 const FRAME_BYTES: usize = 2048;
 /// Longest combined status: 253 servos with 12 bytes each.
-const FAST_BYTES: usize = 4096;
+pub(super) const FAST_BYTES: usize = 4096;
 /// What a host has to wait per possible id after a broadcast ping, beside the answers' wire time.
 const PING_SLOT: Duration = Duration::from_millis(3);
 
@@ -28,7 +28,7 @@ pub struct MasterOptions {
     /// Largest return delay of the servos until the chain knows better. Default 508 us, the most
     /// that register 9 can hold.
     pub return_delay: Duration,
-    /// Least allowance for adapter and system. Default 400 us.
+    /// Least allowance for adapter and system. Default 600 us.
     pub min_allowance: Duration,
     /// Most allowance, and the one to begin with. Default 4 ms: a USB adapter with a latency timer
     /// of 1 ms, or a busy system.
@@ -39,27 +39,31 @@ impl Default for MasterOptions {
     fn default() -> Self {
         MasterOptions {
             return_delay: wire::return_delay(254),
-            min_allowance: Duration::from_micros(400),
+            min_allowance: Duration::from_micros(600),
             max_allowance: Duration::from_millis(4),
         }
     }
 }
 
+/// Left of a control cycle after the servos behind a silent one were asked again.
+const SPARE_MARGIN: Duration = Duration::from_micros(300);
+
 /// Speaks Protocol 2.0 over a [`Port`].
 pub struct Master {
-    port: Box<dyn Port>,
-    options: MasterOptions,
-    allowance: Duration,
+    pub(super) port: Box<dyn Port>,
+    pub(super) return_delay: Duration,
+    pub(super) allowance: Allowance,
     /// When the last byte handed to the port leaves it.
     line_free_at: Time,
-    parser: FrameParser<FRAME_BYTES>,
+    cycle_end: Option<Time>,
+    pub(super) parser: FrameParser<FRAME_BYTES>,
     /// Bytes of a combined status.
-    combined: Box<[u8; FAST_BYTES]>,
+    pub(super) combined: Box<[u8; FAST_BYTES]>,
     out: Box<[u8; FRAME_BYTES]>,
     sent: u64,
-    received: u64,
+    pub(super) received: u64,
     /// Damage that the parser does not see.
-    damaged: u64,
+    pub(super) damaged: u64,
 }
 
 impl Master {
@@ -67,9 +71,10 @@ impl Master {
     pub fn new(port: Box<dyn Port>, options: MasterOptions) -> Self {
         Master {
             port,
-            allowance: options.max_allowance,
-            options,
+            return_delay: options.return_delay,
+            allowance: Allowance::new(options.min_allowance, options.max_allowance),
             line_free_at: Time::ZERO,
+            cycle_end: None,
             parser: FrameParser::new(),
             combined: Box::new([0; FAST_BYTES]),
             out: Box::new([0; FRAME_BYTES]),
@@ -85,7 +90,7 @@ impl Master {
     }
 
     /// Sends the frame that `encode` writes, after whatever is on the line, having thrown away stale input.
-    fn send<F>(&mut self, encode: F) -> Result<(), ClientError>
+    pub(super) fn send<F>(&mut self, encode: F) -> Result<(), ClientError>
     where
         F: for<'b> FnOnce(&'b mut [u8]) -> Result<&'b [u8], BufferTooSmall>,
     {
@@ -95,9 +100,17 @@ impl Master {
                 limit: capacity,
             }
         })?;
-        let stale = self.parser.buffered() as u64;
-        self.damaged += stale;
+        self.damaged += self.parser.buffered() as u64;
         self.parser.clear();
+        if self.allowance.take_gave_up() {
+            let mut late = [0; 256];
+            let count = self.port.read(&mut late, 1, self.port.now())?;
+            if count > 0 {
+                // The answer given up was late rather than lost.
+                self.damaged += count as u64;
+                self.allowance.lengthen();
+            }
+        }
         self.port.discard_input()?;
         let begin = self.port.now().max(self.line_free_at);
         self.line_free_at = begin + wire::duration(frame.len(), self.port.baud());
@@ -107,31 +120,31 @@ impl Master {
     }
 
     /// When `bytes` of answers to the request just sent must be there if nobody is late.
-    fn due(&self, delays: u32, bytes: usize) -> Time {
-        self.line_free_at + self.options.return_delay * delays + self.wire_time(bytes)
+    pub(super) fn due(&self, delays: u32, bytes: usize) -> Time {
+        self.line_free_at + self.return_delay * delays + self.wire_time(bytes)
+    }
+
+    /// Until when the next part of an answer due at `due` is waited for, when `behind` servos with
+    /// answers of `size` bytes would be asked again if it does not come.
+    pub(super) fn deadline(&self, due: Time, behind: usize, size: usize) -> Time {
+        let again = wire::sync_read(behind) + wire::fast_status(behind, size);
+        let spare = self
+            .cycle_end
+            .map(|end| end - self.wire_time(again) - SPARE_MARGIN);
+        let patient = due + self.allowance.get();
+        spare.map_or(patient, |spare| patient.max(spare))
     }
 
     /// Learns from an answer that was complete just now and due at `due`.
-    fn arrived(&mut self, due: Time) {
+    pub(super) fn arrived(&mut self, due: Time) {
         let lateness = self.port.now().saturating_since(due);
-        let wish = (lateness * 2 + Duration::from_micros(100))
-            .clamp(self.options.min_allowance, self.options.max_allowance);
-        // Up at once, down slowly: one quick answer says little about the next.
-        self.allowance = match self.allowance.checked_sub(wish) {
-            Some(excess) => self.allowance - excess / 64,
-            None => wish,
-        };
-    }
-
-    /// Learns from an answer that did not come: it may be late rather than lost.
-    fn missed(&mut self) {
-        self.allowance = (self.allowance * 3 / 2).min(self.options.max_allowance);
+        self.allowance.arrived(lateness);
     }
 
     /// Takes statuses in until `accept` says that it has what it wants (true) or `deadline` passes (false).
     ///
     /// `want` is how many bytes are expected, so that waiting costs few calls.
-    fn receive(
+    pub(super) fn receive(
         &mut self,
         mut want: usize,
         deadline: Time,
@@ -168,7 +181,7 @@ impl Master {
         let bytes = wire::status(data.len());
         let asked_at = self.port.now();
         let due = self.due(1, bytes);
-        let deadline = due + self.allowance;
+        let deadline = due + self.allowance.get();
         let mut result = None;
         let expected = data.len();
         let answered = self.receive(bytes, deadline, |status| {
@@ -197,7 +210,7 @@ impl Master {
         if answered {
             self.arrived(due);
         } else {
-            self.missed();
+            self.allowance.missed(true);
         }
         result.unwrap_or_else(|| {
             let waited = self.port.now().saturating_since(asked_at);
@@ -210,7 +223,7 @@ impl Master {
 }
 
 /// What the receiver of a status thinks of it.
-enum Accepted {
+pub(super) enum Accepted {
     /// Nothing more is wanted.
     Done,
     /// It was wanted, others too.
@@ -258,11 +271,15 @@ impl Client for Master {
     }
 
     fn set_return_delay(&mut self, delay: Duration) {
-        self.options.return_delay = delay;
+        self.return_delay = delay;
     }
 
     fn patience(&self) -> Duration {
-        self.options.return_delay + self.allowance
+        self.return_delay + self.allowance.get()
+    }
+
+    fn set_cycle_end(&mut self, end: Option<Time>) {
+        self.cycle_end = end;
     }
 
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError> {
@@ -282,7 +299,7 @@ impl Client for Master {
         let ids = u32::from(MAX_ID) + 1;
         let deadline = self.line_free_at
             + (PING_SLOT + self.wire_time(wire::PING_STATUS)) * ids
-            + self.options.max_allowance;
+            + self.allowance.max();
         self.receive(wire::PING_STATUS, deadline, |status| {
             match ping_reply(status.id, status.alert, status.params) {
                 Some(ping) => {
@@ -337,68 +354,7 @@ impl Client for Master {
         data: &mut [u8],
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
-        outcomes.fill(Outcome::NotReached);
-        let request = Instruction::SyncRead {
-            address,
-            length,
-            ids,
-        };
-        self.send(|buf| request.encode(BROADCAST_ID, buf))?;
-        let size = usize::from(length);
-        let answer_bytes = wire::status(size);
-        // The servo whose turn it is.
-        let mut turn = 0;
-        while turn < ids.len() {
-            // Some servos pass over a silent predecessor when its time is over: the wait lasts until
-            // the second one behind it had its turn, or its answer would collide with the next request.
-            let latest = (turn + 3).min(ids.len());
-            let deadline = self.due(latest as u32, latest * answer_bytes) + self.allowance;
-            let want = (ids.len() - turn) * answer_bytes;
-            let mut heard = turn;
-            let bad_crc = self.parser.damage().bad_crc;
-            let answered = self.receive(want, deadline, |status| {
-                let index = ids.iter().position(|&id| id == status.id);
-                let Some(index) = index.filter(|&index| outcomes[index] == Outcome::NotReached)
-                else {
-                    return Accepted::Stranger;
-                };
-                heard = index;
-                outcomes[index] = if status.error != ErrorCode::None {
-                    Outcome::Refused(status.error)
-                } else if let Some(place) = data
-                    .get_mut(index * size..(index + 1) * size)
-                    .filter(|place| place.len() == status.params.len())
-                {
-                    place.copy_from_slice(status.params);
-                    Outcome::Fresh(Reply {
-                        alert: status.alert,
-                    })
-                } else {
-                    Outcome::Damaged
-                };
-                Accepted::Done
-            })?;
-            let missing = if self.parser.damage().bad_crc > bad_crc {
-                Outcome::Damaged
-            } else {
-                Outcome::Silent
-            };
-            if !answered {
-                outcomes[turn] = missing;
-                self.missed();
-                return Ok(());
-            }
-            for passed in &mut outcomes[turn..heard.max(turn)] {
-                if *passed == Outcome::NotReached {
-                    *passed = missing;
-                }
-            }
-            turn = turn.max(heard + 1);
-            if turn == ids.len() {
-                self.arrived(self.due(turn as u32, turn * answer_bytes));
-            }
-        }
-        Ok(())
+        self.read_in_turn(address, length, ids, data, outcomes)
     }
 
     fn fast_sync_read(
@@ -409,92 +365,6 @@ impl Client for Master {
         data: &mut [u8],
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
-        outcomes.fill(Outcome::NotReached);
-        let size = usize::from(length);
-        let total = wire::fast_status(ids.len(), size);
-        let blocks_len = match u16::try_from(total - fast::PREFIX_LEN) {
-            Ok(blocks_len) if total <= FAST_BYTES / 2 => blocks_len,
-            _ => return self.sync_read(address, length, ids, data, outcomes),
-        };
-        let request = Instruction::FastSyncRead {
-            address,
-            length,
-            ids,
-        };
-        self.send(|buf| request.encode(BROADCAST_ID, buf))?;
-        let filled = self.receive_combined(total, blocks_len, ids.len(), size)?;
-        let bytes = &self.combined[..filled];
-        let Some(begin) = fast::find_prefix(bytes, blocks_len) else {
-            self.damaged += filled as u64;
-            if let Some(first) = outcomes.first_mut() {
-                // Bytes without a prefix: somebody spoke, and it was damaged.
-                *first = if filled >= fast::PREFIX_LEN {
-                    Outcome::Damaged
-                } else {
-                    Outcome::Silent
-                };
-            }
-            return Ok(());
-        };
-        self.damaged += begin as u64;
-        let mut blocks = Blocks::new(&bytes[begin..]);
-        for (index, &id) in ids.iter().enumerate() {
-            match blocks.next_block(id, size) {
-                Ok(block) if block.error == ErrorCode::None => {
-                    if let Some(place) = data.get_mut(index * size..(index + 1) * size) {
-                        place.copy_from_slice(block.data);
-                        outcomes[index] = Outcome::Fresh(Reply { alert: block.alert });
-                    }
-                }
-                Ok(block) => outcomes[index] = Outcome::Refused(block.error),
-                Err(fast::BlockError::Incomplete { .. }) => {
-                    outcomes[index] = Outcome::Silent;
-                    return Ok(());
-                }
-                Err(_) => {
-                    self.damaged += 1;
-                    outcomes[index] = Outcome::Damaged;
-                    return Ok(());
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Master {
-    /// Receives a combined status of `total` bytes, or as much of it as comes; returns the bytes received.
-    ///
-    /// A bad checksum in the middle does not end it: as long as bytes come, the line is not free.
-    fn receive_combined(
-        &mut self,
-        total: usize,
-        blocks_len: u16,
-        servos: usize,
-        size: usize,
-    ) -> Result<usize, ClientError> {
-        let block = size + fast::BLOCK_OVERHEAD;
-        let mut filled = 0;
-        loop {
-            // Stale bytes in front are no part of the answer.
-            let stale = fast::find_prefix(&self.combined[..filled], blocks_len).unwrap_or(0);
-            let got = filled - stale;
-            if got >= total {
-                self.arrived(self.due(1, total));
-                return Ok(filled);
-            }
-            let whole_blocks = got.saturating_sub(fast::PREFIX_LEN) / block;
-            let next = wire::fast_status((whole_blocks + 1).min(servos), size);
-            let deadline = self.due(1, next) + self.allowance;
-            let rest = (total - got).min(FAST_BYTES - filled);
-            let place = &mut self.combined[filled..filled + rest];
-            let count = self.port.read(place, rest, deadline)?;
-            if count == 0 {
-                self.missed();
-                return Ok(filled);
-            }
-            filled += count;
-            self.received += count as u64;
-        }
+        self.read_combined(address, length, ids, data, outcomes)
     }
 }

@@ -5,12 +5,14 @@
 //! `dynamixel2` crate as a second implementation (feature `dxl-serial2`); [`model`] says
 //! what the registers mean; [`DynamixelChain`] is the [`ServoBus`](super::ServoBus) in joint angles.
 
+mod allowance;
 #[cfg(feature = "dxl-serial2")]
 pub mod backend_dynamixel2;
 pub mod chain;
 mod check;
 pub mod client;
 mod cycle;
+mod group_read;
 pub mod master;
 pub mod model;
 mod recovery;

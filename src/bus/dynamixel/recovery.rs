@@ -13,7 +13,7 @@ const TRIPPED: u8 = 0xFF;
 /// What one count of the watchdog is.
 const WATCHDOG_COUNT: Duration = Duration::from_millis(20);
 /// How long a retry may be put off because the cycle has no room for it.
-const PATIENCE: Duration = Duration::from_millis(500);
+const PATIENCE: Duration = Duration::from_millis(250);
 
 /// Registers 98 to 135: from the bus watchdog to the present position.
 const RETURN_BYTES: usize = 38;
@@ -25,20 +25,28 @@ impl DynamixelChain {
         let everybody_silent = self.servos.iter().all(|servo| servo.link == Link::Silent);
         let due = (0..self.servos.len())
             .filter(|&index| self.servos[index].link == Link::Silent)
-            .filter(|&index| self.servos[index].retry_at <= now)
+            .filter(|&index| self.servos[index].retry_at <= begin)
             .min_by_key(|&index| self.servos[index].retry_at);
         let Some(index) = due else {
             return Ok(());
         };
         let request = wire::duration(wire::READ + wire::status(1), self.client.baud());
-        // Most likely it is silent still, and all of the wait is spent.
-        let needed = request + self.client.patience();
-        let room = now.saturating_since(begin) + needed <= self.options.cycle_budget;
+        // The first time it was likely one lost answer. Later it is likely silent still, and all of the
+        // wait is spent.
+        let first = self.servos[index].retry_after < self.options.retry_every / 8;
+        let wait = if first {
+            Duration::ZERO
+        } else {
+            self.client.patience()
+        };
+        let room = now.saturating_since(begin) + request + wait <= self.options.cycle_budget;
         let overdue = now.saturating_since(self.servos[index].retry_at) >= PATIENCE;
         if !(room || overdue || everybody_silent) {
             return Ok(());
         }
-        self.servos[index].retry_at = now + self.options.retry_every;
+        let servo = &mut self.servos[index];
+        servo.retry_at = now + servo.retry_after;
+        servo.retry_after = (servo.retry_after * 2).min(self.options.retry_every);
         match self.welcome_back(index) {
             Ok(()) => {
                 self.last_heard = self.client.now();
