@@ -208,8 +208,14 @@ fn a_hundred_thousand_cycles_of_mischief_stay_inside_the_limits() {
         refused += puppet.rejected_samples();
     }
     assert!(moved_rad > 0.5, "nothing moved: {moved_rad} rad");
-    assert!(refused > 1000 && refused < taken / 2, "{refused} of {taken} samples refused");
-    println!("{} cycles, {refused} of {taken} samples refused", EPISODES * CYCLES);
+    assert!(
+        refused > 1000 && refused < taken / 2,
+        "{refused} of {taken} samples refused"
+    );
+    println!(
+        "{} cycles, {refused} of {taken} samples refused",
+        EPISODES * CYCLES
+    );
 }
 
 /// Plays into the steady drumming and on until `until_s`; samples are heard unless in `gap`.
