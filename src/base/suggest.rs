@@ -11,6 +11,14 @@ pub fn nearest<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -
         .map(|(_, name)| name)
 }
 
+/// The end of a sentence that says `found` is unknown: `; did you mean "near"?`, or a full stop.
+pub fn hint<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+    match nearest(found, candidates) {
+        Some(near) => format!("; did you mean {near:?}?"),
+        None => ".".into(),
+    }
+}
+
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

@@ -17,11 +17,15 @@ use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
 /// A performer's hands, body or face bring a robot to life.
+///
+/// Without a command: `run` with the built-in quadruped and a recorded performer, no hardware needed.
 #[derive(Parser, Debug)]
-#[command(name = "handwave", version, propagate_version = true)]
+#[command(name = "handwave", version, propagate_version = true, args_conflicts_with_subcommands = true, after_help = run::EXAMPLES)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    run: run::RunOptions,
 }
 
 #[derive(Subcommand, Debug)]
@@ -44,7 +48,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome: Result<ExitStatus, Failure> = match cli.command {
-        None => run::run(&run::RunArgs::default()),
+        None => run::run(&run::RunArgs::built_in(cli.run)),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Gesture(args)) => gesture::run(args),
         Some(Command::Poses(args)) => poses::run(args),

@@ -21,7 +21,26 @@ use std::sync::Arc;
 
 /// Arguments of `handwave run`.
 #[derive(Args, Debug, Default)]
-#[command(after_help = "Examples:
+#[command(after_help = EXAMPLES)]
+pub struct RunArgs {
+    /// A character (default: the built-in quadruped)
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+impl RunArgs {
+    /// The built-in quadruped with `options`: what `handwave` does without a command.
+    pub fn built_in(options: RunOptions) -> Self {
+        Self {
+            config: None,
+            options,
+        }
+    }
+}
+
+/// Examples and exit codes, for `--help`.
+pub const EXAMPLES: &str = "Examples:
   handwave run                                        the built-in quadruped, simulated, with a recorded performer
   handwave run --bus dynamixel:/dev/ttyUSB0@1000000   the same on real servos
   handwave run my_robot.toml --input file:take3.jsonl
@@ -29,10 +48,11 @@ use std::sync::Arc;
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
 Ctrl-C once: the robot comes to rest, lies down, torque goes off. Twice: torque goes off at once.
-Exit codes: 0 done, 2 bad usage, config or input, 3 bus failure, 4 safety stop, 130 interrupted.")]
-pub struct RunArgs {
-    /// A character (default: the built-in quadruped)
-    config: Option<PathBuf>,
+Exit codes: 0 done, 2 bad usage, config or input, 3 bus failure, 4 safety stop, 130 interrupted.";
+
+/// Options of `handwave run`.
+#[derive(Args, Debug, Default)]
+pub struct RunOptions {
     /// Pose source in place of the configuration's, such as file:take.jsonl
     #[arg(long, value_name = "SOURCE")]
     input: Option<String>,
@@ -75,7 +95,8 @@ pub enum Speed {
 
 /// Runs `handwave run`.
 pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
-    let mut character = match &args.config {
+    let RunArgs { config, options } = args;
+    let mut character = match config {
         None => config::load(Files::Embedded, BUILT_IN),
         Some(path) => {
             let (files, name) = Files::of(path);
@@ -83,34 +104,34 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         }
     }
     .map_err(Failure::input)?;
-    if let Some(bus) = &args.bus {
+    if let Some(bus) = &options.bus {
         character.bus = bus
             .parse()
             .map_err(|e| Failure::input(format!("--bus {bus}: {e}")))?;
     }
-    let rate_hz = args.rate.unwrap_or(character.rate_hz);
+    let rate_hz = options.rate.unwrap_or(character.rate_hz);
     if !(10.0..=2000.0).contains(&rate_hz) {
         return Err(Failure::input(format!(
             "--rate {rate_hz} is not in 10..2000 Hz"
         )));
     }
-    if let Some(d) = args.duration
+    if let Some(d) = options.duration
         && !(d > 0.0)
     {
         return Err(Failure::input(format!("--duration {d} must be above 0 s")));
     }
-    let faults = faults(args, &character)?;
-    if args.speed == Speed::Max && character.bus != BusAddress::Sim {
+    let faults = faults(options, &character)?;
+    if options.speed == Speed::Max && character.bus != BusAddress::Sim {
         return Err(Failure::input(
             "--speed max would drive the servos on a real bus faster than real time; it works with --bus sim only",
         ));
     }
-    let reader = match &args.input {
+    let reader = match &options.input {
         Some(input) => source::open(input, &source::working_folder()),
         None => source::open(&character.source, &character.files),
     }
     .map_err(Failure::input)?;
-    let targets = args
+    let targets = options
         .targets
         .as_ref()
         .map(|path| {
@@ -126,20 +147,20 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         display: Display::Quiet,
         newest: CycleRecord::default(),
     };
-    let report = match args.speed {
+    let report = match options.speed {
         Speed::Max => {
             let clock = VirtualClock::new();
             let shared: Arc<dyn Clock> = Arc::new(clock.clone());
-            let session = session(args, &character, rate_hz, reader, faults, shared, stop)?;
+            let session = session(options, &character, rate_hz, reader, faults, shared, stop)?;
             session::run_virtual(session, &clock, &mut onlooker)
         }
         Speed::Real => {
             let clock: Arc<dyn Clock> = Arc::new(RealClock::new());
-            if !args.headless {
+            if !options.headless {
                 onlooker.display = Display::open(&character, &stop);
             }
             let session = session(
-                args,
+                options,
                 &character,
                 rate_hz,
                 reader,
@@ -155,17 +176,18 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
     if let Some(targets) = onlooker.targets {
         targets.finish().map_err(Failure::input)?;
     }
-    conclude(args, report, &character)
+    conclude(options, report, &character)
 }
 
-fn faults(args: &RunArgs, character: &Character) -> Result<Vec<FaultSpec>, Failure> {
-    if !args.fault.is_empty() && character.bus != BusAddress::Sim {
+fn faults(options: &RunOptions, character: &Character) -> Result<Vec<FaultSpec>, Failure> {
+    if !options.fault.is_empty() && character.bus != BusAddress::Sim {
         return Err(Failure::input(
             "--fault works on the simulated bus inside this process only; give it to `handwave sim dynamixel` instead",
         ));
     }
     let ids: Vec<u8> = character.servos.iter().map(|s| s.id).collect();
-    args.fault
+    options
+        .fault
         .iter()
         .map(|text| {
             let fault: FaultSpec = text
@@ -183,7 +205,7 @@ fn faults(args: &RunArgs, character: &Character) -> Result<Vec<FaultSpec>, Failu
 
 /// Opens the bus and puts the session together.
 fn session(
-    args: &RunArgs,
+    options: &RunOptions,
     character: &Character,
     rate_hz: f64,
     reader: SourceReader,
@@ -202,7 +224,7 @@ fn session(
         bus: wire.bus,
         reader,
         stop,
-        options: session::control_options(character, rate_hz, args.duration),
+        options: session::control_options(character, rate_hz, options.duration),
         on_start: Box::new(move |start| {
             if let Some(line) = &line {
                 wire::inject(line, &faults, start);
@@ -212,8 +234,12 @@ fn session(
 }
 
 /// Prints the summary and turns the ending into an exit code.
-fn conclude(args: &RunArgs, report: Report, character: &Character) -> Result<ExitStatus, Failure> {
-    if args.json {
+fn conclude(
+    options: &RunOptions,
+    report: Report,
+    character: &Character,
+) -> Result<ExitStatus, Failure> {
+    if options.json {
         say(format_args!("{}", summary::to_json(&report, character)));
     } else {
         say(format_args!(

@@ -48,6 +48,14 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
 pub fn to_text(report: &Report, character: &Character) -> String {
     let stats = &report.stats;
     let line = |p: Percentiles| format!("p50 {} us, p99 {} us, max {} us", p.p50, p.p99, p.max);
+    if stats.cycles == 0 {
+        return format!(
+            "{}: {} before the first cycle\n{}",
+            character.name,
+            ending_word(&report.ending),
+            torque_lines(report, character)
+        );
+    }
     let share = |n: u64| 100.0 * n as f64 / stats.cycles.max(1) as f64;
     let mut text = format!(
         "{}: {}\n\
@@ -82,16 +90,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         line(stats.lateness.percentiles()),
     );
     text += &fault_lines(report, character);
-    if let Some(torque) = &report.torque {
-        text += &format!(
-            "torque        off, read back from {} of {} servos\n",
-            torque.confirmed_off.len(),
-            character.joints.len()
-        );
-        for (joint, reason) in &torque.unconfirmed {
-            text += &format!("torque        NOT confirmed off: joint {joint}: {reason}\n");
-        }
-    }
+    text += &torque_lines(report, character);
     if report.records_lost > 0 {
         text += &format!(
             "note          {} cycles are missing in view and targets: the disk or terminal was too slow\n",
@@ -104,6 +103,21 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         .chain(report.real_time.iter().flat_map(|r| &r.notes))
     {
         text += &format!("note          {note}\n");
+    }
+    text
+}
+
+fn torque_lines(report: &Report, character: &Character) -> String {
+    let mut text = String::new();
+    if let Some(torque) = &report.torque {
+        text += &format!(
+            "torque        off, read back from {} of {} servos\n",
+            torque.confirmed_off.len(),
+            character.joints.len()
+        );
+        for (joint, reason) in &torque.unconfirmed {
+            text += &format!("torque        NOT confirmed off: joint {joint}: {reason}\n");
+        }
     }
     text
 }

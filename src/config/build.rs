@@ -1,24 +1,23 @@
 //! From a configuration to checked parts: every file read, every name resolved, every number in range.
 
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, JointEntry, LayerEntry, OnExit, OnLost};
+use super::file::{CharacterFile, OnExit, OnLost};
 use super::files::Files;
-use crate::base::suggest::nearest;
+use super::motion::{
+    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts, read,
+};
+use super::servos::servo_map;
+use crate::base::suggest::hint;
 use crate::body::JointSpace;
-use crate::bus::address::BusAddress;
-use crate::bus::dynamixel::{Direction, Model, ServoSpec};
+use crate::bus::BusAddress;
+use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet};
 use crate::motion::Animator;
-use crate::motion::class::{Example, MotionClass};
-use crate::motion::clip::{Clip, ClipFile, ClipKind};
-use crate::motion::graph::{Graph, GraphOptions};
-use crate::motion::layer::{ChannelMap, Layer};
+use crate::motion::class::MotionClass;
+use crate::motion::graph::Graph;
+use crate::motion::layer::Layer;
 use crate::motion::range::JointRange;
 use crate::robot::{Envelope, JointEnvelope, RobotModel};
-use std::ops::Range;
-
-/// A servo of the joint map, in model order.
-pub type ServoEntry = ServoSpec;
 
 /// A checked character: everything but the pose stream and the bus.
 #[derive(Debug)]
@@ -36,7 +35,7 @@ pub struct Character {
     /// Joint names in model order.
     pub joints: Vec<String>,
     /// Servos in model order.
-    pub servos: Vec<ServoEntry>,
+    pub servos: Vec<ServoSpec>,
     /// Gestures.
     pub gestures: GestureSet,
     /// How gestures are read.
@@ -59,7 +58,7 @@ pub struct Character {
     pub safety: Safety,
     /// Pictures per second of the terminal view.
     pub view_hz: f64,
-    graph: (usize, Vec<(usize, usize)>, GraphOptions),
+    graph: GraphParts,
     layers: Vec<LayerParts>,
 }
 
@@ -80,31 +79,6 @@ pub struct Safety {
     pub on_lost: OnLost,
     /// Torque at the end.
     pub on_exit: OnExit,
-}
-
-/// A class before it is built.
-#[derive(Clone, Debug)]
-pub struct ClassParts {
-    /// Class name.
-    pub name: String,
-    /// Index of its gesture in the gesture set.
-    pub gesture: usize,
-    examples: Vec<Example>,
-}
-
-impl ClassParts {
-    /// Names of the example clips, in the order of the class's weights.
-    pub fn clip_names(&self) -> Vec<String> {
-        self.examples.iter().map(|e| e.clip.name.clone()).collect()
-    }
-}
-
-#[derive(Clone, Debug)]
-struct LayerParts {
-    name: String,
-    channel: String,
-    map: ChannelMap,
-    clip: Clip,
 }
 
 /// Loads the configuration `name` from `files` and checks all of it.
@@ -218,9 +192,7 @@ impl Character {
         for parts in &self.layers {
             let channel = front.channel_index(&parts.channel).ok_or_else(|| {
                 let names = front.channel_names();
-                let hint = nearest(&parts.channel, names.iter().map(String::as_str))
-                    .map(|n| format!("; did you mean {n:?}?"))
-                    .unwrap_or_default();
+                let hint = hint(&parts.channel, names.iter().map(String::as_str));
                 wrong(
                     "layer.channel",
                     format!(
@@ -323,36 +295,6 @@ fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<(), ConfigErr
     Ok(())
 }
 
-fn read(
-    files: &Files,
-    path: &toml::Spanned<String>,
-    key: &str,
-    at: &Pointer<'_>,
-) -> Result<String, ConfigError> {
-    files
-        .read(path.get_ref())
-        .map_err(|e| at.at(path.span(), key, e))
-}
-
-fn clip(
-    files: &Files,
-    path: &toml::Spanned<String>,
-    key: &str,
-    joints: &[String],
-    at: &Pointer<'_>,
-) -> Result<Clip, ConfigError> {
-    let text = read(files, path, key, at)?;
-    ClipFile::from_json(&text)
-        .and_then(|f| f.for_body(joints))
-        .map_err(|e| {
-            at.at(
-                path.span(),
-                key,
-                format!("{}: {e}", files.name(path.get_ref())),
-            )
-        })
-}
-
 fn envelope_limits(file: &CharacterFile, model: &RobotModel) -> Vec<JointEnvelope> {
     model
         .limits()
@@ -364,127 +306,6 @@ fn envelope_limits(file: &CharacterFile, model: &RobotModel) -> Vec<JointEnvelop
             acceleration: file.robot.acceleration_rad_s2,
         })
         .collect()
-}
-
-fn servo_map(
-    file: &CharacterFile,
-    model: &RobotModel,
-    at: &Pointer<'_>,
-) -> Result<Vec<ServoSpec>, ConfigError> {
-    let joints = model.joint_names();
-    let servo_model = Model::by_name(file.bus.model.get_ref()).ok_or_else(|| {
-        let names: Vec<&str> = crate::bus::dynamixel::model::MODELS
-            .iter()
-            .map(|m| m.name)
-            .collect();
-        at.key(
-            "bus.model",
-            format!(
-                "unknown servo model {:?}. Allowed: {}",
-                file.bus.model.get_ref(),
-                names.join(", ")
-            ),
-        )
-    })?;
-    let mut by_joint: Vec<Option<&JointEntry>> = vec![None; joints.len()];
-    for entry in &file.robot.joint {
-        let name = entry.name.get_ref();
-        let Some(joint) = joints.iter().position(|j| j == name) else {
-            let hint = nearest(name, joints.iter().map(String::as_str))
-                .map(|n| format!("; did you mean {n:?}?"))
-                .unwrap_or_default();
-            return Err(at.at(
-                entry.name.span(),
-                "robot.joint.name",
-                format!(
-                    "{name:?} is not a moving joint of {}{hint} Joints: {}",
-                    file.robot.urdf.get_ref(),
-                    joints.join(", ")
-                ),
-            ));
-        };
-        if let Some(other) = by_joint
-            .iter()
-            .flatten()
-            .find(|o| o.servo.get_ref() == entry.servo.get_ref())
-        {
-            return Err(at.at(
-                entry.servo.span(),
-                "robot.joint.servo",
-                format!(
-                    "servo {} is already given to joint {}; every joint needs its own",
-                    entry.servo.get_ref(),
-                    other.name.get_ref()
-                ),
-            ));
-        }
-        if by_joint[joint].replace(entry).is_some() {
-            return Err(at.at(
-                entry.name.span(),
-                "robot.joint.name",
-                format!("joint {name} is listed twice"),
-            ));
-        }
-    }
-    joints
-        .iter()
-        .zip(by_joint)
-        .zip(model.limits())
-        .map(|((joint, entry), limit)| {
-            let entry = entry.ok_or_else(|| {
-                at.key(
-                    "robot.joint",
-                    format!("joint {joint} has no servo; add {{ name = \"{joint}\", servo = ID }}"),
-                )
-            })?;
-            servo_spec(entry, joint, servo_model, (limit.lower, limit.upper), at)
-        })
-        .collect()
-}
-
-fn servo_spec(
-    entry: &JointEntry,
-    joint: &str,
-    model: &'static Model,
-    (lower, upper): (f64, f64),
-    at: &Pointer<'_>,
-) -> Result<ServoSpec, ConfigError> {
-    let direction = match entry.direction {
-        1 => Direction::Forward,
-        -1 => Direction::Reverse,
-        other => {
-            return Err(at.at(
-                entry.name.span(),
-                "robot.joint.direction",
-                format!("{other} is not 1 or -1"),
-            ));
-        }
-    };
-    let [min_pulse, max_pulse] = *entry.range_pulse.get_ref();
-    let spec = ServoSpec {
-        id: *entry.servo.get_ref(),
-        joint: joint.into(),
-        model,
-        zero_pulse: entry.zero_pulse,
-        direction,
-        min_pulse,
-        max_pulse,
-    };
-    spec.check()
-        .map_err(|e| at.at(entry.name.span(), "robot.joint", e))?;
-    let ends = [spec.position_rad(min_pulse), spec.position_rad(max_pulse)];
-    let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-    if lower < low - 1e-3 || upper > high + 1e-3 {
-        return Err(at.at(
-            entry.name.span(),
-            "robot.joint",
-            format!(
-                "joint {joint} moves in {lower:.3}..{upper:.3} rad, its servo only reaches {low:.3}..{high:.3} rad with zero_pulse {} and range_pulse {min_pulse}..{max_pulse}; correct these or narrow the URDF's limits",
-                entry.zero_pulse
-            ),
-        ));
-    }
-    Ok(spec)
 }
 
 fn gesture_set(
@@ -507,175 +328,4 @@ fn gesture_set(
     let text = read(files, &entry.file, "gesture.file", at)?;
     GestureSet::from_toml(&text, &files.name(entry.file.get_ref()))
         .map_err(|e| at.at(entry.file.span(), "gesture.file", e))
-}
-
-fn class_parts(
-    files: &Files,
-    file: &CharacterFile,
-    joints: &[String],
-    gestures: &GestureSet,
-    at: &Pointer<'_>,
-) -> Result<Vec<ClassParts>, ConfigError> {
-    if file.class.is_empty() {
-        return Err(at.key("class", "no motion class; add a [[class]] with clips"));
-    }
-    let mut parts: Vec<ClassParts> = Vec::new();
-    for class in &file.class {
-        let name = class.name.get_ref();
-        if parts.iter().any(|p| p.name == *name) {
-            return Err(at.at(
-                class.name.span(),
-                "class.name",
-                format!("{name:?} is used twice"),
-            ));
-        }
-        let wanted = class.gesture.get_ref();
-        let names = || gestures.gestures.iter().map(|g| g.name.as_str());
-        let gesture = names().position(|g| g == wanted).ok_or_else(|| {
-            let hint = nearest(wanted, names())
-                .map(|n| format!("; did you mean {n:?}?"))
-                .unwrap_or_default();
-            let all: Vec<&str> = names().collect();
-            at.at(
-                class.gesture.span(),
-                "class.gesture",
-                format!("no gesture {wanted:?}{hint} Gestures: {}", all.join(", ")),
-            )
-        })?;
-        let mut examples = Vec::new();
-        for entry in &class.clip {
-            let in_range = (0.0..=10.0).contains(&entry.amplitude)
-                && (0.0..=50.0).contains(&entry.frequency_hz);
-            if !in_range {
-                return Err(at.at(
-                    entry.file.span(),
-                    "class.clip",
-                    format!(
-                        "amplitude {} must lie in 0..10, frequency_hz {} in 0..50",
-                        entry.amplitude, entry.frequency_hz
-                    ),
-                ));
-            }
-            let clip = clip(files, &entry.file, "class.clip.file", joints, at)?;
-            if clip.kind == ClipKind::Cycle && entry.amplitude > 0.0 && entry.frequency_hz <= 0.0 {
-                return Err(at.at(
-                    entry.file.span(),
-                    "class.clip.frequency_hz",
-                    format!(
-                        "clip {} is a cycle and needs a frequency above 0 Hz",
-                        clip.name
-                    ),
-                ));
-            }
-            examples.push(Example {
-                clip,
-                parameters: [entry.amplitude, entry.frequency_hz],
-            });
-        }
-        parts.push(ClassParts {
-            name: name.clone(),
-            gesture,
-            examples,
-        });
-    }
-    Ok(parts)
-}
-
-type GraphParts = (usize, Vec<(usize, usize)>, GraphOptions);
-
-fn graph_parts(
-    file: &CharacterFile,
-    classes: &[ClassParts],
-    at: &Pointer<'_>,
-) -> Result<GraphParts, ConfigError> {
-    let find = |name: &str, span: Range<usize>, key: &str| {
-        classes.iter().position(|c| c.name == name).ok_or_else(|| {
-            let names: Vec<&str> = classes.iter().map(|c| c.name.as_str()).collect();
-            let hint = nearest(name, names.iter().copied())
-                .map(|n| format!("; did you mean {n:?}?"))
-                .unwrap_or_default();
-            at.at(
-                span,
-                key,
-                format!("no class {name:?}{hint} Classes: {}", names.join(", ")),
-            )
-        })
-    };
-    let graph = &file.graph;
-    let start = match &graph.start {
-        Some(name) => find(name.get_ref(), name.span(), "graph.start")?,
-        None => 0,
-    };
-    let mut edges = Vec::new();
-    match &graph.edges {
-        Some(list) => {
-            for edge in list {
-                let [from, to] = edge.get_ref();
-                edges.push((
-                    find(from, edge.span(), "graph.edges")?,
-                    find(to, edge.span(), "graph.edges")?,
-                ));
-            }
-        }
-        None => {
-            for from in 0..classes.len() {
-                edges.extend(
-                    (0..classes.len())
-                        .filter(|to| *to != from)
-                        .map(|to| (from, to)),
-                );
-            }
-        }
-    }
-    let standard = GraphOptions::default();
-    let options = GraphOptions {
-        rise: graph.rise.unwrap_or(standard.rise),
-        abort: graph.abort.unwrap_or(standard.abort),
-        release: graph.release.unwrap_or(standard.release),
-        blend_s: graph.blend_s.unwrap_or(standard.blend_s),
-        idle_s: graph.idle_s.unwrap_or(standard.idle_s),
-    };
-    Ok((start, edges, options))
-}
-
-fn layer_parts(
-    files: &Files,
-    entry: &LayerEntry,
-    joints: &[String],
-    at: &Pointer<'_>,
-) -> Result<LayerParts, ConfigError> {
-    let [low, high] = *entry.range.get_ref();
-    if !(low.is_finite() && high.is_finite() && low != high) {
-        return Err(at.at(
-            entry.range.span(),
-            "layer.range",
-            format!("[{low}, {high}] must be two different finite numbers"),
-        ));
-    }
-    if !(0.0..=0.9).contains(&entry.dead_zone) {
-        return Err(at.at(
-            entry.range.span(),
-            "layer.dead_zone",
-            format!("{} is not in 0..0.9", entry.dead_zone),
-        ));
-    }
-    let clip = clip(files, &entry.clip, "layer.clip", joints, at)?;
-    if clip.kind != ClipKind::Path {
-        return Err(at.at(
-            entry.clip.span(),
-            "layer.clip",
-            format!("clip {} is a cycle; a layer needs a path", clip.name),
-        ));
-    }
-    Ok(LayerParts {
-        name: entry.name.clone(),
-        channel: entry.channel.get_ref().clone(),
-        map: ChannelMap {
-            low,
-            high,
-            one_sided: entry.one_sided,
-            dead_zone: entry.dead_zone,
-        },
-        clip,
-    })
 }

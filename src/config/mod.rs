@@ -7,7 +7,9 @@ pub mod build;
 pub mod error;
 pub mod file;
 pub mod files;
+mod motion;
+mod servos;
 
-pub use build::{Character, ServoEntry, load};
+pub use build::{Character, load};
 pub use error::ConfigError;
 pub use files::Files;

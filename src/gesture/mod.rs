@@ -1,10 +1,9 @@
-//! Gestures: definition from one example, planes, wave estimators, activation.
+//! Gestures: definition from one example, planes, wave estimators.
 //!
 //! The way of a pose: [`FrontEnd::push`] removes its global motion, every gesture's [`Plane`] maps
 //! what is left to one complex number (or a progression), and an [`Estimator`] reads amplitude,
 //! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
 
-mod activation;
 mod define;
 mod estimator;
 mod file;
@@ -18,7 +17,6 @@ mod set;
 mod smooth;
 mod window;
 
-pub use activation::{Activation, ActivationThresholds};
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };

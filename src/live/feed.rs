@@ -26,11 +26,18 @@ struct Schedule {
 }
 
 impl Schedule {
-    /// When a sample stamped `t` is due; `None` before the stream has begun.
-    fn due(&mut self, t: f64) -> Option<f64> {
-        let begins = self.begins_at_s?;
-        let first = *self.first_t.get_or_insert(t);
-        Some(begins + (t - first))
+    /// The sample with its time on the control clock if it is due by `now_s`; else itself.
+    fn release(&mut self, mut sample: PoseSample, now_s: f64) -> Result<PoseSample, PoseSample> {
+        let Some(begins) = self.begins_at_s else {
+            return Err(sample);
+        };
+        let first = *self.first_t.get_or_insert(sample.t);
+        let due = begins + (sample.t - first);
+        if due > now_s {
+            return Err(sample);
+        }
+        sample.t = due;
+        Ok(sample)
     }
 }
 
@@ -86,15 +93,12 @@ impl<R: BufRead> Feed for ReaderFeed<R> {
     fn take(&mut self, now_s: f64, out: &mut Vec<PoseSample>) {
         loop {
             self.fetch();
-            let Some(mut sample) = self.next.take() else {
+            let Some(sample) = self.next.take() else {
                 return;
             };
-            match self.schedule.due(sample.t) {
-                Some(due) if due <= now_s => {
-                    sample.t = due;
-                    out.push(sample);
-                }
-                _ => {
+            match self.schedule.release(sample, now_s) {
+                Ok(sample) => out.push(sample),
+                Err(sample) => {
                     self.next = Some(sample);
                     return;
                 }
@@ -194,16 +198,16 @@ impl Feed for QueueFeed {
                     Err(_) => {}
                 }
             }
-            let Some(mut sample) = self.next.take() else {
+            // `out` has room for what one cycle can bring; the rest waits for the next cycle.
+            if out.len() == out.capacity() {
+                return;
+            }
+            let Some(sample) = self.next.take() else {
                 return;
             };
-            match self.schedule.due(sample.t) {
-                // `out` has room for what one cycle can bring; the rest waits for the next cycle.
-                Some(due) if due <= now_s && out.len() < out.capacity() => {
-                    sample.t = due;
-                    out.push(sample);
-                }
-                _ => {
+            match self.schedule.release(sample, now_s) {
+                Ok(sample) => out.push(sample),
+                Err(sample) => {
                     self.next = Some(sample);
                     return;
                 }

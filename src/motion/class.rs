@@ -79,6 +79,9 @@ const FULL_FROM_AMPLITUDE: f64 = 0.15;
 const RANGE_SHARE: f64 = 0.65;
 /// The stride is shortened to this part before phase lock is given up.
 const LEAST_STRIDE: f64 = 0.4;
+/// The phase may gain or lose this part of the tempo to meet the gesture's: out of phase by half a
+/// turn at the onset, it locks within two periods.
+const CATCH_UP: f64 = 0.4;
 /// Limbs may gain or lose this part of the phase advance against the body (thesis: 0.95..1.05).
 const LIMB_ADVANCE: f64 = 0.05;
 
@@ -282,7 +285,7 @@ impl MotionClass {
         let state = &mut self.state;
         let amplitude = state
             .amplitude
-            .step(wanted.min(1.0), 9.0, 2.5, dt_s)
+            .step(wanted.min(1.0), 9.0, 2.0, dt_s)
             .max(0.0);
         if performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
             let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
@@ -324,7 +327,7 @@ impl MotionClass {
         let goal_rate = if state.locked {
             // Second-order lock: feed-forward of the gesture's frequency, correction of the phase.
             let lag = wrap_pi(drive.phase_rad - state.phase);
-            let bound = 0.2 * rate;
+            let bound = CATCH_UP * rate;
             let correction = if wanted > 0.0 && lag.is_finite() {
                 (self.lock_rate * lag).clamp(-bound, bound)
             } else {

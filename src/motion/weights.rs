@@ -4,7 +4,7 @@
 //! 9.5.2: per example a linear fit of its indicator over the parameter space plus a radial basis
 //! that makes it exact at every example. Negative weights are cut off and the rest is scaled to one.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, Vector2};
 
 /// Parameters of a clip or of a wish: amplitude (0..1) and frequency (Hz).
 pub type Parameters = [f64; 2];
@@ -173,7 +173,7 @@ impl Weights {
 }
 
 fn distance(a: &Parameters, b: &Parameters) -> f64 {
-    DVector::from_row_slice(&[a[0] - b[0], a[1] - b[1]]).norm()
+    Vector2::new(a[0] - b[0], a[1] - b[1]).norm()
 }
 
 /// A smooth bump: 1 at the centre, 0 from `radius` on (Wendland's C2 function).

@@ -1,0 +1,240 @@
+//! Classes, graph and layers of a configuration, checked and resolved to indices.
+
+use super::error::{ConfigError, Pointer};
+use super::file::{CharacterFile, LayerEntry};
+use super::files::Files;
+use crate::base::suggest::hint;
+use crate::gesture::GestureSet;
+use crate::motion::class::Example;
+use crate::motion::clip::{Clip, ClipFile, ClipKind};
+use crate::motion::graph::GraphOptions;
+use crate::motion::layer::ChannelMap;
+use std::ops::Range;
+
+/// A class before it is built.
+#[derive(Clone, Debug)]
+pub struct ClassParts {
+    /// Class name.
+    pub name: String,
+    /// Index of its gesture in the gesture set.
+    pub gesture: usize,
+    pub(super) examples: Vec<Example>,
+}
+
+impl ClassParts {
+    /// Names of the example clips, in the order of the class's weights.
+    pub fn clip_names(&self) -> Vec<String> {
+        self.examples.iter().map(|e| e.clip.name.clone()).collect()
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct LayerParts {
+    pub(super) name: String,
+    pub(super) channel: String,
+    pub(super) map: ChannelMap,
+    pub(super) clip: Clip,
+}
+
+/// Text of the file that `path` names.
+pub(super) fn read(
+    files: &Files,
+    path: &toml::Spanned<String>,
+    key: &str,
+    at: &Pointer<'_>,
+) -> Result<String, ConfigError> {
+    files
+        .read(path.get_ref())
+        .map_err(|e| at.at(path.span(), key, e))
+}
+
+/// The clip that `path` names, in the order of `joints`.
+pub(super) fn clip(
+    files: &Files,
+    path: &toml::Spanned<String>,
+    key: &str,
+    joints: &[String],
+    at: &Pointer<'_>,
+) -> Result<Clip, ConfigError> {
+    let text = read(files, path, key, at)?;
+    ClipFile::from_json(&text)
+        .and_then(|f| f.for_body(joints))
+        .map_err(|e| {
+            at.at(
+                path.span(),
+                key,
+                format!("{}: {e}", files.name(path.get_ref())),
+            )
+        })
+}
+
+/// Classes in node order, with their clips.
+pub(super) fn class_parts(
+    files: &Files,
+    file: &CharacterFile,
+    joints: &[String],
+    gestures: &GestureSet,
+    at: &Pointer<'_>,
+) -> Result<Vec<ClassParts>, ConfigError> {
+    if file.class.is_empty() {
+        return Err(at.key("class", "no motion class; add a [[class]] with clips"));
+    }
+    let mut parts: Vec<ClassParts> = Vec::new();
+    for class in &file.class {
+        let name = class.name.get_ref();
+        if parts.iter().any(|p| p.name == *name) {
+            return Err(at.at(
+                class.name.span(),
+                "class.name",
+                format!("{name:?} is used twice"),
+            ));
+        }
+        let wanted = class.gesture.get_ref();
+        let names = || gestures.gestures.iter().map(|g| g.name.as_str());
+        let gesture = names().position(|g| g == wanted).ok_or_else(|| {
+            let hint = hint(wanted, names());
+            let all: Vec<&str> = names().collect();
+            at.at(
+                class.gesture.span(),
+                "class.gesture",
+                format!("no gesture {wanted:?}{hint} Gestures: {}", all.join(", ")),
+            )
+        })?;
+        let mut examples = Vec::new();
+        for entry in &class.clip {
+            let in_range = (0.0..=10.0).contains(&entry.amplitude)
+                && (0.0..=50.0).contains(&entry.frequency_hz);
+            if !in_range {
+                return Err(at.at(
+                    entry.file.span(),
+                    "class.clip",
+                    format!(
+                        "amplitude {} must lie in 0..10, frequency_hz {} in 0..50",
+                        entry.amplitude, entry.frequency_hz
+                    ),
+                ));
+            }
+            let clip = clip(files, &entry.file, "class.clip.file", joints, at)?;
+            if clip.kind == ClipKind::Cycle && entry.amplitude > 0.0 && entry.frequency_hz <= 0.0 {
+                return Err(at.at(
+                    entry.file.span(),
+                    "class.clip.frequency_hz",
+                    format!(
+                        "clip {} is a cycle and needs a frequency above 0 Hz",
+                        clip.name
+                    ),
+                ));
+            }
+            examples.push(Example {
+                clip,
+                parameters: [entry.amplitude, entry.frequency_hz],
+            });
+        }
+        parts.push(ClassParts {
+            name: name.clone(),
+            gesture,
+            examples,
+        });
+    }
+    Ok(parts)
+}
+
+/// Start node, edges, options.
+pub(super) type GraphParts = (usize, Vec<(usize, usize)>, GraphOptions);
+
+/// Start node, edges and options.
+pub(super) fn graph_parts(
+    file: &CharacterFile,
+    classes: &[ClassParts],
+    at: &Pointer<'_>,
+) -> Result<GraphParts, ConfigError> {
+    let find = |name: &str, span: Range<usize>, key: &str| {
+        classes.iter().position(|c| c.name == name).ok_or_else(|| {
+            let names: Vec<&str> = classes.iter().map(|c| c.name.as_str()).collect();
+            let hint = hint(name, names.iter().copied());
+            at.at(
+                span,
+                key,
+                format!("no class {name:?}{hint} Classes: {}", names.join(", ")),
+            )
+        })
+    };
+    let graph = &file.graph;
+    let start = match &graph.start {
+        Some(name) => find(name.get_ref(), name.span(), "graph.start")?,
+        None => 0,
+    };
+    let mut edges = Vec::new();
+    match &graph.edges {
+        Some(list) => {
+            for edge in list {
+                let [from, to] = edge.get_ref();
+                edges.push((
+                    find(from, edge.span(), "graph.edges")?,
+                    find(to, edge.span(), "graph.edges")?,
+                ));
+            }
+        }
+        None => {
+            for from in 0..classes.len() {
+                edges.extend(
+                    (0..classes.len())
+                        .filter(|to| *to != from)
+                        .map(|to| (from, to)),
+                );
+            }
+        }
+    }
+    let standard = GraphOptions::default();
+    let options = GraphOptions {
+        rise: graph.rise.unwrap_or(standard.rise),
+        abort: graph.abort.unwrap_or(standard.abort),
+        release: graph.release.unwrap_or(standard.release),
+        blend_s: graph.blend_s.unwrap_or(standard.blend_s),
+        idle_s: graph.idle_s.unwrap_or(standard.idle_s),
+    };
+    Ok((start, edges, options))
+}
+
+/// A layer, not yet bound to its channel.
+pub(super) fn layer_parts(
+    files: &Files,
+    entry: &LayerEntry,
+    joints: &[String],
+    at: &Pointer<'_>,
+) -> Result<LayerParts, ConfigError> {
+    let [low, high] = *entry.range.get_ref();
+    if !(low.is_finite() && high.is_finite() && low != high) {
+        return Err(at.at(
+            entry.range.span(),
+            "layer.range",
+            format!("[{low}, {high}] must be two different finite numbers"),
+        ));
+    }
+    if !(0.0..=0.9).contains(&entry.dead_zone) {
+        return Err(at.at(
+            entry.range.span(),
+            "layer.dead_zone",
+            format!("{} is not in 0..0.9", entry.dead_zone),
+        ));
+    }
+    let clip = clip(files, &entry.clip, "layer.clip", joints, at)?;
+    if clip.kind != ClipKind::Path {
+        return Err(at.at(
+            entry.clip.span(),
+            "layer.clip",
+            format!("clip {} is a cycle; a layer needs a path", clip.name),
+        ));
+    }
+    Ok(LayerParts {
+        name: entry.name.clone(),
+        channel: entry.channel.get_ref().clone(),
+        map: ChannelMap {
+            low,
+            high,
+            one_sided: entry.one_sided,
+            dead_zone: entry.dead_zone,
+        },
+        clip,
+    })
+}

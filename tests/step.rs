@@ -1,0 +1,312 @@
+//! The pure step: no allocation, the same bits again, inside the limits whatever comes in, calm when poses are lost.
+#![allow(unsafe_code, reason = "a global allocator that counts")]
+
+mod support;
+
+use handwave::base::{JointState, Time};
+use handwave::config::file::OnLost;
+use handwave::live::session;
+use handwave::pose::PoseSample;
+use handwave::puppet::{Inputs, Stage};
+use handwave::sim::fault::Chance;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use support::character::{Player, RATE_HZ, built_in, performance};
+use support::limits::LimitWatch;
+use support::recipe;
+
+/// Counts the allocations of each thread.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count() {
+    // Not counted while the thread ends.
+    let _ = ALLOCATIONS.try_with(|n| n.set(n.get() + 1));
+}
+
+// SAFETY: hands everything to the system's allocator and only counts beside it.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations() -> u64 {
+    ALLOCATIONS.with(Cell::get)
+}
+
+#[test]
+fn the_whole_performance_allocates_nothing_and_repeats_bit_for_bit() {
+    let character = built_in();
+    let begins_s = character.safety.ramp_s + 0.005;
+    let mut first = Player::new(&character, begins_s);
+    let mut second = Player::new(&character, begins_s);
+    let mut watch = LimitWatch::new(&character.limits, 1.0 / RATE_HZ);
+    let mut late = Vec::new();
+    let mut goes_on = true;
+    while goes_on {
+        let before = allocations();
+        goes_on = first.step(true);
+        let made = allocations() - before;
+        if made > 0 && first.cycle > 10 && late.len() < 5 {
+            late.push((first.cycle, made));
+        }
+        second.step(true);
+        let bits = |p: &Player| {
+            p.positions()
+                .iter()
+                .map(|x| x.to_bits())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(bits(&first), bits(&second), "cycle {}", first.cycle);
+        watch
+            .see(first.positions())
+            .unwrap_or_else(|e| panic!("{e}"));
+    }
+    assert_eq!(late, [], "(cycle, allocations) after the tenth");
+    assert!(first.t_s() > first.ends_s(), "ended at {} s", first.t_s());
+    println!(
+        "{} cycles without allocation; {}",
+        first.cycle,
+        watch.extremes()
+    );
+}
+
+/// Samples as no tracker should send them.
+struct Mischief {
+    chance: Chance,
+    good: Vec<PoseSample>,
+    next: usize,
+}
+
+impl Mischief {
+    fn odd_number(&mut self) -> f64 {
+        match self.chance.below(6) {
+            0 => f64::NAN,
+            1 => f64::INFINITY,
+            2 => -1e300,
+            3 => 1e-310,
+            _ => f64::from(self.chance.bits()) / 4e9 - 0.5,
+        }
+    }
+
+    /// The samples of a cycle at `t_s`: mostly good ones, some late, twice, jumping or broken.
+    fn samples(&mut self, t_s: f64, out: &mut Vec<PoseSample>) {
+        out.clear();
+        while self.chance.happens(0.45) && out.len() < 8 {
+            let mut sample = self.good[self.next].clone();
+            let jump = if self.chance.happens(0.02) {
+                self.chance.below(500)
+            } else {
+                1
+            };
+            self.next = (self.next + jump) % self.good.len();
+            sample.t = t_s - 0.004 * f64::from(self.chance.bits()) / 4_294_967_296.0;
+            match self.chance.below(40) {
+                0 => sample.t = self.odd_number(),
+                1 => sample.t -= 5.0,
+                2 => sample.t += 0.02,
+                3 => out.push(sample.clone()),
+                4 => {
+                    let broken = [self.odd_number(), self.odd_number(), self.odd_number()];
+                    let point = self.chance.below(sample.points.len());
+                    sample.points[point] = Some(broken);
+                }
+                5 => sample.points.fill(None),
+                6 => sample.points.truncate(2),
+                7 => {
+                    let point = self.chance.below(sample.points.len());
+                    sample.points[point] = None;
+                }
+                8 => sample
+                    .points
+                    .iter_mut()
+                    .flatten()
+                    .for_each(|p| *p = [0.1; 3]),
+                _ => {}
+            }
+            out.push(sample);
+        }
+    }
+}
+
+#[test]
+fn a_hundred_thousand_cycles_of_mischief_stay_inside_the_limits() {
+    const EPISODES: u64 = 20;
+    const CYCLES: u64 = 5_000;
+    let base: u64 = std::env::var("HANDWAVE_SEED").map_or(20_260, |s| s.parse().expect("a seed"));
+    let character = built_in();
+    let (header, good) = performance(&character);
+    let joints = character.joints.len();
+    let mut moved_rad = 0.0_f64;
+    let (mut refused, mut taken) = (0, 0);
+    for seed in base..base + EPISODES {
+        let mut mischief = Mischief {
+            chance: Chance::new(seed),
+            next: 0,
+            good: good.clone(),
+        };
+        let next = mischief.chance.below(good.len());
+        mischief.next = next;
+        let present: Vec<f64> = character
+            .limits
+            .iter()
+            .map(|l| l.lower + (l.upper - l.lower) * mischief.chance.below(1001) as f64 / 1000.0)
+            .collect();
+        let mut puppet = session::puppet(&character, &header, RATE_HZ).expect("a puppet");
+        puppet.begin(Time::ZERO, &present);
+        let mut watch = LimitWatch::new(&character.limits, 1.0 / RATE_HZ);
+        watch.see(&present).expect("a start inside");
+        let ends = 2_000 + mischief.chance.below(5_000) as u64;
+        let states = vec![
+            JointState {
+                position: f64::NAN,
+                ..JointState::default()
+            };
+            joints
+        ];
+        let mut samples = Vec::new();
+        for cycle in 0..CYCLES {
+            let t_s = cycle as f64 / RATE_HZ;
+            mischief.samples(t_s, &mut samples);
+            taken += samples.len() as u64;
+            let inputs = Inputs {
+                samples: &samples,
+                states: &states,
+                finish: cycle > ends,
+            };
+            let targets = puppet.step(Time::from_secs(t_s), &inputs);
+            let told = || format!("HANDWAVE_SEED={seed}, cycle {cycle}, {:?}", targets.stage);
+            assert!(
+                targets.positions.iter().all(|p| p.is_finite()),
+                "{}: {:?}",
+                told(),
+                targets.positions
+            );
+            watch
+                .see(&targets.positions)
+                .unwrap_or_else(|e| panic!("{}: {e}", told()));
+            moved_rad = moved_rad.max((targets.positions[1] - present[1]).abs());
+        }
+        refused += puppet.rejected_samples();
+    }
+    assert!(moved_rad > 0.5, "nothing moved: {moved_rad} rad");
+    assert!(
+        refused > 1000 && refused < taken / 2,
+        "{refused} of {taken} samples refused"
+    );
+    println!(
+        "{} cycles, {refused} of {taken} samples refused",
+        EPISODES * CYCLES
+    );
+}
+
+/// Plays into the steady drumming and on until `until_s`; samples are heard unless in `gap`.
+struct Watched {
+    player: Player,
+    watch: LimitWatch,
+    held_back: u64,
+}
+
+impl Watched {
+    fn play(&mut self, until_s: f64, heard: bool) -> f64 {
+        let mut fastest = 0.0_f64;
+        while self.player.t_s() < until_s && self.player.step(heard) {
+            self.watch
+                .see(self.player.positions())
+                .unwrap_or_else(|e| panic!("{e}"));
+            self.held_back += u64::from(self.player.puppet.targets().held_back > 0);
+            fastest = fastest.max(self.watch.fastest_rad_s());
+        }
+        fastest
+    }
+}
+
+/// A puppet in the middle of the second drumming segment, and the time.
+fn drumming(on_lost: OnLost) -> (Watched, f64, f64) {
+    let mut character = built_in();
+    character.safety.on_lost = on_lost;
+    let begins_s = character.safety.ramp_s + 0.005;
+    let segment = recipe::drumming().swap_remove(1);
+    let lost_at_s = begins_s + segment.from_s + 3.0;
+    let mut watched = Watched {
+        player: Player::new(&character, begins_s),
+        watch: LimitWatch::new(&character.limits, 1.0 / RATE_HZ),
+        held_back: 0,
+    };
+    let fastest = watched.play(lost_at_s, true);
+    assert!(fastest > 0.5, "not walking: {fastest} rad/s");
+    (watched, lost_at_s, character.safety.lost_s)
+}
+
+#[test]
+fn lost_poses_bring_the_legs_to_rest_and_poses_that_return_resume() {
+    let (mut watched, lost_at_s, lost_s) = drumming(OnLost::Idle);
+    let coasting = watched.play(lost_at_s + 0.3, false);
+    assert!(coasting > 0.5, "stopped within 0.3 s: {coasting} rad/s");
+    watched.play(lost_at_s + lost_s - 0.01, false);
+    assert!(
+        !watched.player.puppet.targets().poses_lost,
+        "lost too early"
+    );
+    watched.play(lost_at_s + lost_s + 0.02, false);
+    assert!(
+        watched.player.puppet.targets().poses_lost,
+        "not lost after {lost_s} s"
+    );
+    watched.play(lost_at_s + lost_s + 0.6, false);
+    let resting = watched.play(lost_at_s + lost_s + 1.5, false);
+    assert!(resting < 0.02, "still moving at {resting} rad/s");
+    let resumed = watched.play(lost_at_s + lost_s + 3.5, true);
+    assert!(resumed > 0.5, "poses are back, legs at {resumed} rad/s");
+    assert!(!watched.player.puppet.targets().poses_lost);
+    assert_eq!(
+        watched.held_back,
+        0,
+        "the envelope had to act: {}",
+        watched.watch.extremes()
+    );
+    println!(
+        "coasting {coasting:.2}, resting {resting:.4}, resumed {resumed:.2} rad/s; {}",
+        watched.watch.extremes()
+    );
+}
+
+#[test]
+fn with_on_lost_stop_the_run_lies_down() {
+    let (mut watched, lost_at_s, lost_s) = drumming(OnLost::Stop);
+    watched.play(lost_at_s + lost_s + 0.1, false);
+    assert_eq!(watched.player.puppet.stage(), Stage::Settling);
+    watched.play(lost_at_s + lost_s + 8.0, false);
+    let took = watched.player.t_s() - lost_at_s;
+    assert_eq!(watched.player.puppet.stage(), Stage::Done, "after {took} s");
+    let lie = built_in().end_pose.expect("an end pose");
+    for (joint, (at, lie)) in watched.player.positions().iter().zip(&lie).enumerate() {
+        assert!(
+            (at - lie).abs() < 1e-6,
+            "joint {joint} at {at}, lying is {lie}"
+        );
+    }
+    assert_eq!(watched.held_back, 0, "the envelope had to act");
+    println!(
+        "lying {took:.2} s after the last pose; {}",
+        watched.watch.extremes()
+    );
+}

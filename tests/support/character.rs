@@ -1,0 +1,87 @@
+//! The built-in character as a library user has it, and its performance played cycle by cycle.
+
+use handwave::base::{JointState, Time};
+use handwave::config::files::BUILT_IN;
+use handwave::config::{self, Character, Files};
+use handwave::live::{session, source};
+use handwave::pose::{PoseHeader, PoseSample};
+use handwave::puppet::{Inputs, Puppet, Stage};
+
+pub const RATE_HZ: f64 = 200.0;
+
+pub fn built_in() -> Character {
+    config::load(Files::Embedded, BUILT_IN).expect("the built-in character")
+}
+
+/// Header and samples of the bundled performance.
+pub fn performance(character: &Character) -> (PoseHeader, Vec<PoseSample>) {
+    let reader = source::open(&character.source, &character.files).expect("the performance");
+    let header = reader.header().clone();
+    let samples = reader.map(|sample| sample.expect("a good sample"));
+    (header, samples.collect())
+}
+
+/// A puppet and the performance it is given, as the control loop does it.
+pub struct Player {
+    pub puppet: Puppet,
+    samples: Vec<PoseSample>,
+    next: usize,
+    states: Vec<JointState>,
+    pub cycle: u64,
+}
+
+impl Player {
+    /// At rest with every joint at zero. The samples come on the run's clock from `begins_s` on.
+    pub fn new(character: &Character, begins_s: f64) -> Self {
+        let (header, mut samples) = performance(character);
+        let first = samples[0].t;
+        for sample in &mut samples {
+            sample.t += begins_s - first;
+        }
+        let mut puppet = session::puppet(character, &header, RATE_HZ).expect("a puppet");
+        let joints = character.joints.len();
+        puppet.begin(Time::ZERO, &vec![0.0; joints]);
+        Self {
+            puppet,
+            samples,
+            next: 0,
+            states: vec![JointState::default(); joints],
+            cycle: 0,
+        }
+    }
+
+    pub fn t_s(&self) -> f64 {
+        self.cycle as f64 / RATE_HZ
+    }
+
+    /// When the last sample is due.
+    pub fn ends_s(&self) -> f64 {
+        self.samples.last().map_or(0.0, |s| s.t)
+    }
+
+    /// One cycle with the samples due by now; samples that are not `heard` are lost. True while it goes on.
+    pub fn step(&mut self, heard: bool) -> bool {
+        let t_s = self.t_s();
+        let from = self.next;
+        while self.samples.get(self.next).is_some_and(|s| s.t <= t_s) {
+            self.next += 1;
+        }
+        let samples = if heard {
+            &self.samples[from..self.next]
+        } else {
+            &[]
+        };
+        let inputs = Inputs {
+            samples,
+            states: &self.states,
+            finish: self.next == self.samples.len(),
+        };
+        self.puppet.step(Time::from_secs(t_s), &inputs);
+        self.cycle += 1;
+        self.puppet.stage() != Stage::Done
+    }
+
+    pub fn positions(&self) -> &[f64] {
+        &self.puppet.targets().positions
+    }
+}

@@ -1,0 +1,11 @@
+//! What integration tests share, one module per concern.
+#![allow(dead_code, reason = "each test program uses a part")]
+
+pub mod character;
+pub mod folder;
+pub mod limits;
+pub mod program;
+pub mod recipe;
+pub mod simulator;
+pub mod spectrum;
+pub mod targets;
