@@ -32,7 +32,8 @@ impl Master {
             // the second one behind it had its turn, or its answer would collide with the next request.
             let latest = (turn + 3).min(ids.len());
             let due = self.due(latest as u32, latest * answer_bytes);
-            let deadline = self.deadline(due, ids.len() - turn - 1, size);
+            let behind = ids.len() - turn - 1;
+            let deadline = self.deadline(due, behind, behind * answer_bytes);
             let want = (ids.len() - turn) * answer_bytes;
             let mut heard = turn;
             let bad_crc = self.parser.damage().bad_crc;
@@ -174,7 +175,13 @@ impl Master {
             let whole_blocks = got.saturating_sub(fast::PREFIX_LEN) / block;
             let next = wire::fast_status((whole_blocks + 1).min(servos), size);
             let behind = servos.saturating_sub(whole_blocks + 1);
-            let deadline = self.deadline(self.due(1, next), behind, size);
+            // Where not even the first servo speaks, the others are asked again one by one.
+            let again = if whole_blocks == 0 {
+                behind * wire::status(size)
+            } else {
+                wire::fast_status(behind, size)
+            };
+            let deadline = self.deadline(self.due(1, next), behind, again);
             let rest = (total - got).min(FAST_BYTES - filled);
             let place = &mut self.combined[filled..filled + rest];
             let count = self.port.read(place, rest, deadline)?;
