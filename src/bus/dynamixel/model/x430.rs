@@ -32,13 +32,8 @@ const fn rw(
     unit: &'static str,
 ) -> Register {
     Register {
-        name,
-        address,
-        size,
         access: Access::ReadWrite,
-        min,
-        max,
-        unit,
+        ..r(name, address, size, min, max, unit)
     }
 }
 
