@@ -82,6 +82,8 @@ const LEAST_STRIDE: f64 = 0.4;
 /// The phase may gain or lose this part of the tempo to meet the gesture's: out of phase by half a
 /// turn at the onset, it locks within two periods.
 const CATCH_UP: f64 = 0.4;
+/// Share of the joints' speed and acceleration that catching up may use.
+const CATCH_UP_SHARE: f64 = 0.8;
 /// Limbs may gain or lose this part of the phase advance against the body (thesis: 0.95..1.05).
 const LIMB_ADVANCE: f64 = 0.05;
 
@@ -285,15 +287,17 @@ impl MotionClass {
         let state = &mut self.state;
         let amplitude = state
             .amplitude
-            .step(wanted.min(1.0), 9.0, 2.5, dt_s)
+            .step(wanted.min(1.0), 9.0, 1.7, dt_s)
             .max(0.0);
+        let mut coming_hz: f64 = 0.0;
         if performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
             let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
             if amplitude < AT_REST {
                 // Nothing moves yet: begin at the tempo that is shown.
                 state.frequency = Follower::at(goal);
             }
-            state.frequency.step(goal, 12.0, 6.0, dt_s);
+            state.frequency.step(goal, 10.0, 4.0, dt_s);
+            coming_hz = goal;
         }
         let frequency_hz = state.frequency.value;
         let wish = [amplitude, frequency_hz];
@@ -303,7 +307,8 @@ impl MotionClass {
         let rate = TAU * frequency_hz;
         let allowed = self.steepness.scale_limit(
             &self.weights,
-            rate.max(self.state.rate),
+            // Where the tempo is going counts too: the stride is short before the legs are fast.
+            rate.max(self.state.rate).max(TAU * coming_hz),
             &self.ranges,
             RANGE_SHARE,
         );
@@ -333,7 +338,14 @@ impl MotionClass {
             } else {
                 0.0
             };
-            rate + correction
+            // Catching up may use more of the joints than a steady cycle, but not all of them.
+            let most = self.steepness.rate_limit(
+                &self.weights,
+                state.stride,
+                &self.ranges,
+                CATCH_UP_SHARE,
+            );
+            rate + correction.min((most - rate).max(0.0))
         } else {
             highest_rate
         };
