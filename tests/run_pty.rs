@@ -2,7 +2,9 @@
 
 mod support;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use support::folder::Folder;
 use support::program::{Running, handwave, wait_for};
 use support::simulator::Simulator;
 
@@ -13,14 +15,31 @@ fn run_on(sim: &Simulator, more: &[&str]) -> Running {
     Running::start(&[&args[..], more].concat())
 }
 
-/// Waits until the run holds all servos: only then is there something to interrupt.
+/// One pair of processes at a time: they live in real time and need the machine.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A run that has written `rows` rows of targets: only then is there something to interrupt.
 ///
 /// The port has one client at a time, so this looks at what the run writes.
-fn wait_for_rows(folder: &support::folder::Folder, rows: usize) {
-    wait_for("targets", SOON, || {
-        let text = std::fs::read_to_string(folder.path("a.csv")).ok()?;
-        (text.lines().count() > rows).then_some(())
-    });
+#[track_caller]
+fn run_until(sim: &Simulator, folder: &Folder, rows: usize) -> Running {
+    let mut run = run_on(sim, &["--targets", &folder.text("a.csv")]);
+    let deadline = Instant::now() + SOON;
+    while rows_in(folder) < rows {
+        if run.has_ended() || Instant::now() > deadline {
+            let ended = run.wait(Duration::ZERO);
+            panic!("ended early, or too slow: {ended:#?}");
+        }
+        std::thread::park_timeout(Duration::from_millis(5));
+    }
+    run
+}
+
+fn rows_in(folder: &Folder) -> usize {
+    std::fs::read_to_string(folder.path("a.csv")).map_or(0, |text| text.lines().count())
 }
 
 /// Torque of all servos, once the simulator serves the next client.
@@ -32,6 +51,7 @@ fn torque(sim: &Simulator) -> Vec<i64> {
 
 #[test]
 fn a_short_run_through_a_separate_process() {
+    let _alone = alone();
     let sim = Simulator::start("1-12");
     let ended = run_on(&sim, &["--duration", "3"]).wait(SOON).expect(0);
     let s = ended.json();
@@ -47,6 +67,7 @@ fn a_short_run_through_a_separate_process() {
 
 #[test]
 fn a_servo_that_is_absent_is_named_with_its_joint() {
+    let _alone = alone();
     let sim = Simulator::start("1-11");
     let ended = run_on(&sim, &[]).wait(SOON).expect(3);
     for part in ["12", "rear_right_knee"] {
@@ -56,10 +77,10 @@ fn a_servo_that_is_absent_is_named_with_its_joint() {
 
 #[test]
 fn a_killed_simulator_ends_the_run_within_two_seconds() {
+    let _alone = alone();
     let mut sim = Simulator::start("1-12");
-    let folder = support::folder::Folder::empty();
-    let run = run_on(&sim, &["--targets", &folder.text("a.csv")]);
-    wait_for_rows(&folder, 200);
+    let folder = Folder::empty();
+    let run = run_until(&sim, &folder, 200);
     let killed = Instant::now();
     sim.process.kill();
     let ended = run.wait(SOON).expect(3);
@@ -77,20 +98,20 @@ fn a_killed_simulator_ends_the_run_within_two_seconds() {
 
 #[test]
 fn one_interrupt_lies_down_and_two_do_not_wait_for_it() {
+    let _alone = alone();
     let mut took = Vec::new();
     for interrupts in [1, 2] {
         let sim = Simulator::start("1-12");
-        let folder = support::folder::Folder::empty();
-        let run = run_on(&sim, &["--targets", &folder.text("a.csv")]);
-        wait_for_rows(&folder, 300);
+        let folder = Folder::empty();
+        let run = run_until(&sim, &folder, 300);
         let began = Instant::now();
         run.interrupt();
         if interrupts == 2 {
             // Signals of a kind do not queue: the second is sent when the first has had its effect.
-            let rows =
-                || std::fs::read_to_string(folder.path("a.csv")).map_or(0, |t| t.lines().count());
-            let before = rows();
-            wait_for("more targets", SOON, || (rows() > before).then_some(()));
+            let before = rows_in(&folder);
+            wait_for("more targets", SOON, || {
+                (rows_in(&folder) > before).then_some(())
+            });
             run.interrupt();
         }
         let ended = run.wait(SOON).expect(130);
@@ -116,10 +137,10 @@ fn one_interrupt_lies_down_and_two_do_not_wait_for_it() {
 
 #[test]
 fn servos_stop_by_themselves_when_the_run_is_killed() {
+    let _alone = alone();
     let sim = Simulator::start("1-12");
-    let folder = support::folder::Folder::empty();
-    let mut run = run_on(&sim, &["--targets", &folder.text("a.csv")]);
-    wait_for_rows(&folder, 300);
+    let folder = Folder::empty();
+    let mut run = run_until(&sim, &folder, 300);
     run.kill();
     // The watchdog trips 200 ms after the last packet; looking at it earlier would feed it.
     let quiet = Instant::now();
@@ -135,6 +156,7 @@ fn servos_stop_by_themselves_when_the_run_is_killed() {
 
 #[test]
 fn the_port_is_free_again_after_each_end() {
+    let _alone = alone();
     let sim = Simulator::start("1-12");
     for _ in 0..2 {
         let args = ["bus", "scan", &sim.bus, "--json"];

@@ -94,6 +94,11 @@ impl Running {
         self.child.wait().expect("an ended child");
     }
 
+    /// Whether it has ended already.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("a child").is_some()
+    }
+
     /// Waits for the end, `at_most` this long.
     #[track_caller]
     pub fn wait(mut self, at_most: Duration) -> Ended {
@@ -107,7 +112,6 @@ impl Running {
                 let said = self.said();
                 panic!("still running after {at_most:?}; it said {said:?}");
             }
-            std::thread::yield_now();
             std::thread::park_timeout(Duration::from_millis(2));
         };
         let (out, err) = self.said();
