@@ -34,7 +34,7 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
         "samples": stats.samples, "samples_dropped": dropped, "samples_refused": report.refused,
         "poses_lost_cycles": stats.poses_lost,
         "bus_errors": stats.silent + stats.damaged, "replies_missing": stats.silent,
-        "frames_damaged": stats.damaged, "bus_bytes": stats.bytes,
+        "damage": stats.damaged, "bus_bytes": stats.bytes,
         "faults": faults, "more_faults": stats.more_faults,
         "pose_to_wire_us": stats.pose_to_wire.percentiles(), "bus_cycle_us": stats.exchange.percentiles(),
         "step_us": stats.step.percentiles(), "lateness_us": stats.lateness.percentiles(),
@@ -63,7 +63,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
          envelope      acted in {} cycles\n\
          transitions   {} done, {} aborted\n\
          poses         {} used, {} dropped{}\n\
-         bus           {} replies missing, {} frames damaged, {:.1} MB\n\
+         bus           {} replies missing, damage {} (stray bytes, wrong checksums), {:.1} MB\n\
          pose to wire  {}\n\
          bus cycle     {}\n\
          step          {}\n\

@@ -234,7 +234,7 @@ fn bus_lines(watch: &Watch, record: &CycleRecord) -> Vec<Line<'static>> {
     vec![
         Line::from(percentiles.join("   ")),
         Line::from(format!(
-            "cycles {}  overruns {}  replies missing {}  frames damaged {}  envelope acted {}",
+            "cycles {}  overruns {}  replies missing {}  damage {}  envelope acted {}",
             watch.cycles, record.overruns, watch.silent, watch.damaged, watch.held_back
         )),
         Line::from(vec![

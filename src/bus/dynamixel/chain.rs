@@ -114,6 +114,8 @@ pub struct DynamixelChain {
     pub(super) fast_failures: u32,
     /// The last fast read brought nothing, and no ordinary read has got through since.
     pub(super) fast_in_doubt: bool,
+    /// A fast read has brought states, and none was in doubt since.
+    pub(super) fast_works: bool,
     /// The cycle before brought no answer at all.
     pub(super) was_mute: bool,
     pub(super) last_heard: Time,
@@ -168,6 +170,7 @@ impl DynamixelChain {
             fast: false,
             fast_failures: 0,
             fast_in_doubt: false,
+            fast_works: false,
             was_mute: false,
             last_heard: now,
             last_cycle: None,

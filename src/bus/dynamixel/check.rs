@@ -51,6 +51,7 @@ impl DynamixelChain {
         }
         self.fast_failures = 0;
         self.fast_in_doubt = false;
+        self.fast_works = false;
         Ok(())
     }
 

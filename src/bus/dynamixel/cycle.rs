@@ -152,6 +152,7 @@ impl DynamixelChain {
         // While fast reads are in doubt, an ordinary one shows who is to blame: they or the line.
         let mut fast = self.fast && !self.fast_in_doubt;
         let mut fast_was_mute = false;
+        let mut asked_ordinary = false;
         for round in 0..MAX_ROUNDS {
             let count = self.scratch.ids.len();
             let answer = if fast {
@@ -167,13 +168,16 @@ impl DynamixelChain {
             }
             self.read_listed(fast)?;
             self.take_states(states, report);
+            asked_ordinary |= !fast;
+            self.fast_works |= fast && report.fresh > 0;
             if fast && report.fresh == 0 && self.servos.iter().any(|servo| servo.mute) {
-                // Not even the first servo spoke: it is silent, or fast reads are not understood.
+                // Not even the first servo spoke. If fast reads have worked so far, it is silent; else an
+                // ordinary read shows whether they are not understood.
                 fast_was_mute = true;
-                fast = false;
+                fast = self.fast_works;
             }
         }
-        self.judge_fast_reads(fast_was_mute, report.fresh);
+        self.judge_fast_reads(fast_was_mute, asked_ordinary, report.fresh);
         self.leave_out_mute(report.fresh);
         for (index, servo) in self.servos.iter().enumerate() {
             if !servo.fresh {
@@ -237,12 +241,14 @@ impl DynamixelChain {
     }
 
     /// Gives fast reads up when time and again only ordinary reads get through.
-    fn judge_fast_reads(&mut self, fast_was_mute: bool, fresh: u16) {
+    fn judge_fast_reads(&mut self, fast_was_mute: bool, asked_ordinary: bool, fresh: u16) {
         if !self.fast {
             return;
         }
-        let ordinary_got_through = fresh > 0 && (fast_was_mute || self.fast_in_doubt);
+        let ordinary_got_through =
+            fresh > 0 && asked_ordinary && (fast_was_mute || self.fast_in_doubt);
         if ordinary_got_through {
+            self.fast_works = false;
             self.fast_failures += 1;
             self.fast = self.fast_failures < FAST_FAILURES;
         } else if fresh > 0 {

@@ -5,6 +5,10 @@ use super::master::{Accepted, FAST_BYTES, Master};
 use handwave_dynamixel::fast::{self, Blocks};
 use handwave_dynamixel::instruction::{Instruction, SyncRead};
 use handwave_dynamixel::{BROADCAST_ID, ErrorCode, wire};
+use std::time::Duration;
+
+/// Waking up this much later than asked for, the system had no time for us.
+const OVERSLEPT: Duration = Duration::from_micros(300);
 
 impl Master {
     /// Sync read: see [`Client::sync_read`](super::Client::sync_read).
@@ -175,16 +179,16 @@ impl Master {
             let whole_blocks = got.saturating_sub(fast::PREFIX_LEN) / block;
             let next = wire::fast_status((whole_blocks + 1).min(servos), size);
             let behind = servos.saturating_sub(whole_blocks + 1);
-            // Where not even the first servo speaks, the others are asked again one by one.
-            let again = if whole_blocks == 0 {
-                behind * wire::status(size)
-            } else {
-                wire::fast_status(behind, size)
-            };
-            let deadline = self.deadline(self.due(1, next), behind, again);
+            let deadline =
+                self.deadline(self.due(1, next), behind, wire::fast_status(behind, size));
             let rest = (total - got).min(FAST_BYTES - filled);
             let place = &mut self.combined[filled..filled + rest];
-            let count = self.port.read(place, rest, deadline)?;
+            let mut count = self.port.read(place, rest, deadline)?;
+            if count == 0 && self.port.now() > deadline + OVERSLEPT {
+                // This machine stood still, and what was to answer may have stood still with it.
+                let grace = self.port.now() + OVERSLEPT;
+                count = self.port.read(place, rest, grace)?;
+            }
             if count == 0 {
                 self.allowance.missed(filled == 0);
                 return Ok(filled);
