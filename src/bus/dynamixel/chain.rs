@@ -259,17 +259,22 @@ impl ServoBus for DynamixelChain {
     }
 
     fn prepare(&mut self, states: &mut [JointState]) -> Result<(), BusError> {
-        self.check_all(states)
+        self.client.set_unhurried(true);
+        let checked = self.check_all(states);
+        self.client.set_unhurried(false);
+        checked
     }
 
     /// Makes the present position the goal of every servo, then turns torque on, reads it back and
     /// starts the servos' bus watchdogs: from here on [`exchange`](ServoBus::exchange) must be called
     /// more often than the watchdog time.
     fn arm(&mut self) -> Result<(), BusError> {
+        self.client.set_unhurried(true);
         let armed = (0..self.servos.len()).try_for_each(|index| self.arm_servo(index));
         // Watchdogs last: while servos are still being set up one by one, none should run.
         let armed = armed
             .and_then(|()| (0..self.servos.len()).try_for_each(|index| self.start_watchdog(index)));
+        self.client.set_unhurried(false);
         if armed.is_err() {
             // Better limp than half awake. The first error is the one to tell.
             let _ = self.torque_off();
