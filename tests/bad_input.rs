@@ -129,7 +129,8 @@ fn a_pose_file_that_is_absent_or_no_pose_stream() {
 fn a_gesture_without_a_period() {
     let folder = Folder::empty();
     // A fingertip that goes its way once, and one that rests; 1e-4 m of a tracker's noise.
-    let moves: [(&str, fn(f64) -> f64, &str); 2] = [
+    type Way = fn(f64) -> f64;
+    let moves: [(&str, Way, &str); 2] = [
         ("once", |t| 0.02 * t * t, "period"),
         ("held", |_| 0.0, "hardly moves"),
     ];
