@@ -191,8 +191,7 @@ fn it_bows_while_the_hand_is_splayed_and_ends_lying() {
     let targets = &whole().targets;
     let held = recipe::segments()
         .into_iter()
-        .filter(|s| s.kind == "hold" && s.source == "splay")
-        .next_back()
+        .rfind(|s| s.kind == "hold" && s.source == "splay")
         .expect("a held splay");
     let bowed = rows_at(targets, held.to_s - 0.5, held.to_s)
         .last()

@@ -6,7 +6,8 @@ use handwave::live::RealClock;
 use handwave::sim::line::SharedLine;
 use handwave::sim::models::XL430_W250;
 use handwave::sim::{Line, LineOptions, PtyServer};
-use handwave_dynamixel::{BROADCAST_ID, fast, instruction::Instruction, lists};
+use handwave_dynamixel::instruction::{Instruction, SyncRead};
+use handwave_dynamixel::{BROADCAST_ID, fast, lists};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -200,11 +201,11 @@ fn cycle_times(link: &Path, count: usize) -> Vec<f64> {
     let (mut goals, mut ask, mut heard) = ([0; 256], [0; 64], [0; 256]);
     let items = ids.iter().map(|id| (*id, 2048u32.to_le_bytes()));
     let goals = lists::encode_sync_write(&mut goals, 116, 4, items).expect("room");
-    let ask = Instruction::FastSyncRead {
+    let ask = Instruction::FastSyncRead(SyncRead {
         address: 126,
         length: 10,
         ids: &ids,
-    }
+    })
     .encode(BROADCAST_ID, &mut ask)
     .expect("room")
     .to_vec();

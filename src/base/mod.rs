@@ -2,6 +2,7 @@
 
 pub mod angle;
 pub mod joints;
+pub mod print;
 pub mod suggest;
 pub mod time;
 

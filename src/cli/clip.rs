@@ -1,6 +1,6 @@
 //! `handwave clip`: author gaits for a legged URDF; look into a clip.
 
-use super::{ExitStatus, Failure};
+use super::{ExitStatus, Failure, say, warn};
 use crate::motion::clip::{ClipFile, ClipKind};
 use crate::motion::gait::{GaitDescription, GaitName};
 use crate::motion::gait_frames::{Authored, author, outside_limits};
@@ -99,7 +99,7 @@ fn gait(args: &GaitArgs) -> Result<ExitStatus, Failure> {
         |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", args.urdf.display()));
     let model = RobotModel::from_urdf(&read(&args.urdf)?).map_err(|e| in_urdf(&e))?;
     for warning in &model.warnings {
-        eprintln!("warning: {}: {warning}", args.urdf.display());
+        warn(format_args!("warning: {}: {warning}", args.urdf.display()));
     }
     let legs = if args.legs.is_empty() {
         let legs = Leg::find_all(&model).map_err(|e| in_urdf(&e))?;
@@ -107,7 +107,7 @@ fn gait(args: &GaitArgs) -> Result<ExitStatus, Failure> {
             .iter()
             .map(|l| format!("{}={}", l.name, model.links[l.foot]))
             .collect();
-        eprintln!("legs found: {}", found.join(","));
+        warn(format_args!("legs found: {}", found.join(",")));
         legs
     } else {
         declared_legs(&model, &args.legs)?
@@ -176,28 +176,30 @@ fn description(args: &GaitArgs) -> Result<GaitDescription, Failure> {
 
 fn report(args: &GaitArgs, authored: &Authored, model: &RobotModel) -> Result<ExitStatus, Failure> {
     let file = &authored.file;
-    println!(
+    say(format_args!(
         "{}: {} frames, {} joints, {:.3} m per cycle",
         args.out.display(),
         file.frames.len(),
         file.joints.len(),
         file.root.forward_m
-    );
+    ));
     if let Some((max_hz, joint)) = &authored.max_frequency {
-        println!("playable up to {max_hz:.2} Hz ({joint} decides)");
+        say(format_args!(
+            "playable up to {max_hz:.2} Hz ({joint} decides)"
+        ));
     }
     if authored.stride_kept < 1.0 {
-        println!(
+        say(format_args!(
             "note: stride and step height were shortened to {:.0} % so that the joints can play {:.2} Hz",
             authored.stride_kept * 100.0,
             file.frequency_hz
-        );
+        ));
     }
     let clip = file
         .for_body(&file.joints)
         .map_err(|e| Failure::input(e.to_string()))?;
     for line in outside_limits(&clip, model) {
-        println!("warning: {line}");
+        say(format_args!("warning: {line}"));
     }
     Ok(ExitStatus::Done)
 }
@@ -211,33 +213,33 @@ fn info(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
             "frames": file.frames.len(), "joints": file.joints,
             "frequency_hz": file.frequency_hz, "root": file.root, "segments": file.segments,
         });
-        println!("{summary}");
+        say(format_args!("{summary}"));
         return Ok(ExitStatus::Done);
     }
     let kind = match file.kind {
         ClipKind::Cycle => "cycle",
         ClipKind::Path => "path",
     };
-    println!(
+    say(format_args!(
         "{} ({kind}, {} frames) {}",
         file.name,
         file.frames.len(),
         file.origin
-    );
+    ));
     if file.kind == ClipKind::Cycle {
-        println!(
+        say(format_args!(
             "made for {:.2} Hz; per cycle {:.3} m forwards, {:.3} m left, {:.3} rad",
             file.frequency_hz, file.root.forward_m, file.root.left_m, file.root.yaw_rad
-        );
+        ));
     }
     for s in &file.segments {
-        println!(
+        say(format_args!(
             "  limb {:<12} phase {:.2}  duty {:.2}  {}",
             s.name,
             s.phase,
             s.duty,
             s.joints.join(" ")
-        );
+        ));
     }
     for (j, joint) in file.joints.iter().enumerate() {
         let (low, high) = file
@@ -246,7 +248,9 @@ fn info(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), f| {
                 (lo.min(f[j]), hi.max(f[j]))
             });
-        println!("  joint {joint:<20} {low:>7.3} .. {high:>6.3} rad");
+        say(format_args!(
+            "  joint {joint:<20} {low:>7.3} .. {high:>6.3} rad"
+        ));
     }
     Ok(ExitStatus::Done)
 }

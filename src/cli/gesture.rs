@@ -1,6 +1,6 @@
 //! `handwave gesture`: define gestures, estimate their waves over a recording, check a set.
 
-use super::{ExitStatus, Failure, poses, say};
+use super::{ExitStatus, Failure, poses, say, warn};
 use crate::base::suggest;
 use crate::gesture::{
     CyclicMarks, Definition, EstimatorKind, FrontEnd, FrontEndOptions, GestureKind, GestureSet,
@@ -224,12 +224,12 @@ fn report(definition: &Definition) {
 fn warn_of_confusion(set: &GestureSet) {
     for response in responses(set).into_iter().flatten() {
         if response.gesture != response.shown && response.largest > 0.2 {
-            eprintln!(
+            warn(format_args!(
                 "`{}` answers {:.2} to frames of `{}`: the two may be confused; make them differ more",
                 set.gestures[response.gesture].name,
                 response.largest,
                 set.gestures[response.shown].name
-            );
+            ));
         }
     }
 }
@@ -266,10 +266,10 @@ fn estimate(
     let mut file = BufWriter::new(File::create(out).map_err(failed)?);
     let refused = write_estimates(&mut file, &set, &recording, &mut front).map_err(failed)?;
     if refused > 0 {
-        eprintln!(
+        warn(format_args!(
             "{}: {refused} samples without estimate: too few points seen",
             poses.display()
-        );
+        ));
     }
     Ok(ExitStatus::Done)
 }

@@ -12,6 +12,7 @@ mod targets;
 
 pub use failure::{ExitStatus, Failure};
 
+use crate::base::print::{say, warn};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -43,12 +44,6 @@ enum Command {
     Sim(sim::SimArgs),
 }
 
-/// Prints a line for the reader. A reader that has gone away (`| head`) is no failure.
-fn say(line: std::fmt::Arguments) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{line}");
-}
-
 /// Parses the command line, runs the command, prints its failure and returns its exit code.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -64,7 +59,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(status) => status.into(),
         Err(failure) => {
-            eprintln!("handwave: {failure}");
+            warn(format_args!("handwave: {failure}"));
             failure.status.into()
         }
     }

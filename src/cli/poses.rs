@@ -1,6 +1,6 @@
 //! `handwave poses`: bring recordings into the pose stream, look at them, compose performances.
 
-use super::{ExitStatus, Failure, say};
+use super::{ExitStatus, Failure, say, warn};
 use crate::pose::{FaultCounts, PoseError, Recording, compose, leap};
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
@@ -107,7 +107,10 @@ pub(super) fn read(path: &Path) -> Result<(Recording, FaultCounts), Failure> {
     let (recording, dropped) =
         Recording::read(path).map_err(|error: PoseError| Failure::input(error))?;
     if dropped.total() > 0 {
-        eprintln!("{}: dropped samples: {dropped}", path.display());
+        warn(format_args!(
+            "{}: dropped samples: {dropped}",
+            path.display()
+        ));
     }
     Ok((recording, dropped))
 }

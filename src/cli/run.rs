@@ -2,7 +2,7 @@
 
 use super::summary;
 use super::targets::TargetsFile;
-use super::{ExitStatus, Failure};
+use super::{ExitStatus, Failure, say};
 use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
 use crate::config::files::BUILT_IN;
@@ -240,9 +240,12 @@ fn conclude(
     character: &Character,
 ) -> Result<ExitStatus, Failure> {
     if options.json {
-        println!("{}", summary::to_json(&report, character));
+        say(format_args!("{}", summary::to_json(&report, character)));
     } else {
-        print!("{}", summary::to_text(&report, character));
+        say(format_args!(
+            "{}",
+            summary::to_text(&report, character).trim_end()
+        ));
     }
     let end = |status, message: String| Failure { status, message };
     if let Some(error) = report.pose_error {

@@ -1,17 +1,17 @@
 //! `handwave sim`: simulated servos on a pseudo-terminal, for any client.
 
-use super::{ExitStatus, Failure};
+use super::{ExitStatus, Failure, say, warn};
 use crate::base::Clock;
 use crate::base::suggest::nearest;
-use crate::live::RealClock;
+use crate::live::{RealClock, realtime};
 use crate::sim::fault::FAULTS;
 use crate::sim::line::SharedLine;
 use crate::sim::models::{self, MODELS};
-use crate::sim::table::Model;
+use crate::sim::table::Device;
 use crate::sim::{FaultSpec, Line, LineOptions, PtyServer, Servo};
 use clap::{Args, Subcommand};
 use handwave_dynamixel::{MAX_ID, baud};
-use std::io::{BufRead, Write};
+use std::io::BufRead;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
@@ -87,12 +87,11 @@ pub fn run(args: SimArgs) -> Result<ExitStatus, Failure> {
 }
 
 fn list_faults() -> Result<ExitStatus, Failure> {
-    let mut out = std::io::stdout().lock();
     for info in FAULTS {
-        // A reader that closed the pipe has seen enough.
-        if writeln!(out, "{} {} {}", info.name, info.scope, info.description).is_err() {
-            break;
-        }
+        say(format_args!(
+            "{} {} {}",
+            info.name, info.scope, info.description
+        ));
     }
     Ok(ExitStatus::Done)
 }
@@ -116,17 +115,16 @@ fn dynamixel(args: &DynamixelArgs) -> Result<ExitStatus, Failure> {
     if args.factory {
         std::thread::spawn(move || follow_plugs(&line, clock.as_ref()));
     }
-    let mut out = std::io::stdout();
-    writeln!(out, "ready {}", link.display())
-        .and_then(|()| out.flush())
-        .map_err(Failure::bus)?;
+    // A wire does not wait for the scheduler; without the right to it all still works.
+    let _best_effort = realtime::request();
+    say(format_args!("ready {}", link.display()));
     server.serve(stop.as_fd()).map_err(Failure::bus)?;
     Ok(ExitStatus::Done)
 }
 
 fn build_line(
     args: &DynamixelArgs,
-    servos: &[(u8, &'static Model)],
+    servos: &[(u8, &'static Device)],
 ) -> Result<(Line, u32), String> {
     if !(0.0..=1000.0).contains(&args.latency_ms) {
         return Err(format!(
@@ -135,11 +133,10 @@ fn build_line(
         ));
     }
     let code = baud::code(args.baud).ok_or_else(|| {
-        let rates: Vec<_> = baud::RATES.iter().map(u32::to_string).collect();
         format!(
             "--baud {} is no rate of these servos; there are {}",
             args.baud,
-            rates.join(", ")
+            baud::RateList
         )
     })?;
     let mut line = Line::new(LineOptions {
@@ -149,12 +146,12 @@ fn build_line(
         ..LineOptions::default()
     });
     let clock_start = crate::base::Time::ZERO;
-    for &(id, model) in servos {
+    for &(id, device) in servos {
         if args.factory {
-            line.attach(id, Servo::factory(model));
+            line.attach(id, Servo::factory(device));
             line.set_plugged(id, servos.len() == 1, clock_start);
         } else {
-            line.attach(id, Servo::commissioned(model, id, code));
+            line.attach(id, Servo::commissioned(device, id, code));
         }
     }
     for spec in &args.faults {
@@ -165,12 +162,12 @@ fn build_line(
 }
 
 /// Reads `1-12[:MODEL][,20:MODEL...]`.
-fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Model)>, String> {
-    let mut servos: Vec<(u8, &'static Model)> = Vec::new();
+fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Device)>, String> {
+    let mut servos: Vec<(u8, &'static Device)> = Vec::new();
     for part in list.split(',') {
-        let (ids, name) = part.split_once(':').unwrap_or((part, MODELS[0].name));
-        let model = models::model(name).ok_or_else(|| {
-            let known = MODELS.iter().map(|model| model.name);
+        let (ids, name) = part.split_once(':').unwrap_or((part, MODELS[0].model.name));
+        let device = models::model(name).ok_or_else(|| {
+            let known = MODELS.iter().map(|device| device.model.name);
             match nearest(name, known.clone()) {
                 Some(near) => format!("--servos: unknown model '{name}'; did you mean '{near}'?"),
                 None => {
@@ -194,7 +191,7 @@ fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Model)>, String> {
             if servos.iter().any(|(other, _)| *other == id) {
                 return Err(format!("--servos: servo {id} is named twice"));
             }
-            servos.push((id, model));
+            servos.push((id, device));
         }
     }
     Ok(servos)
@@ -209,7 +206,9 @@ fn follow_plugs(line: &SharedLine, clock: &dyn Clock) {
             Some(&"unplug") => false,
             None => continue,
             Some(_) => {
-                eprintln!("expected 'plug N' or 'unplug N', found '{command}'");
+                warn(format_args!(
+                    "expected 'plug N' or 'unplug N', found '{command}'"
+                ));
                 continue;
             }
         };
@@ -220,10 +219,10 @@ fn follow_plugs(line: &SharedLine, clock: &dyn Clock) {
         });
         if !found {
             let labels: Vec<_> = line.lock().labels().map(|l| l.to_string()).collect();
-            eprintln!(
+            warn(format_args!(
                 "no such servo in '{command}'; there are {}",
                 labels.join(", ")
-            );
+            ));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Typed configuration: one TOML file names a whole character; checked at load, built into parts.
 //!
-//! [`file`] is what a user writes, [`files`] where its parts are read from (a folder, or those
+//! [`mod@file`] is what a user writes, [`files`] where its parts are read from (a folder, or those
 //! embedded in the program), [`build`] checks it and makes the parts, [`error`] tells what is wrong.
 
 pub mod build;

@@ -7,6 +7,7 @@ use crate::bus::dynamixel::{
 use crate::bus::{BusAddress, PortError, ServoBus};
 use crate::config::Character;
 use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
+use handwave_dynamixel::baud::RateList;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -29,7 +30,8 @@ pub enum WireError {
     Servo(#[from] SpecError),
     /// The simulated line has no such rate.
     #[error(
-        "bus.baud = {baud}: not a rate that the servos have. Allowed: 9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000"
+        "bus.baud = {baud}: not a rate that the servos have. Allowed: {}",
+        RateList
     )]
     Baud {
         /// As configured.
@@ -85,9 +87,9 @@ pub fn open(
 
 fn simulated_line(character: &Character) -> Result<SharedLine, WireError> {
     let name = character.servos.first().map_or("", |s| s.model.name);
-    let model = sim::models::model(name).ok_or_else(|| WireError::Model(name.into()))?;
+    let device = sim::models::model(name).ok_or_else(|| WireError::Model(name.into()))?;
     let ids = character.servos.iter().map(|s| s.id);
-    let line = Line::commissioned(model, ids, character.sim_baud, LineOptions::default()).ok_or(
+    let line = Line::commissioned(device, ids, character.sim_baud, LineOptions::default()).ok_or(
         WireError::Baud {
             baud: character.sim_baud,
         },

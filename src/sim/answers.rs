@@ -3,16 +3,14 @@
 use super::chain::Chain;
 use super::fault::{FaultKind, Target};
 use super::line::AfterSilence;
-use super::models::addr;
 use super::wire::Pace;
 use crate::base::Time;
+use crate::bus::dynamixel::model::address;
 use handwave_dynamixel::{Crc, ErrorCode, MAX_ID, Status, fast};
 use std::time::Duration;
 
 /// Bytes that a truncated reply loses.
 const TRUNCATED_BYTES: usize = 3;
-/// The bit of the error byte that tells of a latched hardware error.
-const ALERT: u8 = 0x80;
 
 impl Chain {
     /// Sync and bulk read: one status after the other.
@@ -30,11 +28,11 @@ impl Chain {
                 let servo = &mut self.slots[index].servo;
                 servo.advance(begin);
                 self.data.clear();
-                let code = servo.read_entry(asked.address, asked.length, begin, &mut self.data);
-                if let Some(code) = code
+                let error = servo.read_entry(asked.address, asked.length, begin, &mut self.data);
+                if let Some(error) = error
                     && self.answers(index, now)
                 {
-                    end = end.max(Some(self.answer(index, asked.id, code, free, baud_bps)));
+                    end = end.max(Some(self.answer(index, asked.id, error, free, baud_bps)));
                 }
             }
             free = match (end, self.options.after_silence) {
@@ -83,9 +81,15 @@ impl Chain {
             let servo = &mut self.slots[index].servo;
             servo.advance(begin);
             self.data.clear();
-            let code = servo.read_entry(asked.address, asked.length, begin, &mut self.data);
-            let Some(code) = code else { return };
-            let error_byte = code | if servo.alert() { ALERT } else { 0 };
+            let error = servo.read_entry(asked.address, asked.length, begin, &mut self.data);
+            let Some(error) = error else { return };
+            let status = Status {
+                id: asked.id,
+                alert: servo.alert(),
+                error,
+                params: &[],
+            };
+            let error_byte = status.error_byte();
             // A servo that cannot read what was asked keeps its place in the frame.
             self.data.resize(usize::from(asked.length), 0);
             let block =
@@ -111,7 +115,7 @@ impl Chain {
         let slot = &self.slots[index];
         let mut delay = Duration::ZERO;
         if self.options.paced {
-            let register = slot.servo.register(addr::RETURN_DELAY_TIME) as u8;
+            let register = slot.servo.register(address::RETURN_DELAY_TIME) as u8;
             delay = handwave_dynamixel::wire::return_delay(register) + self.options.turnaround;
         }
         self.late(slot.label, free + delay)
@@ -123,7 +127,14 @@ impl Chain {
     }
 
     /// Sends a status with the collected data; returns when it has ended.
-    pub fn answer(&mut self, index: usize, id: u8, code: u8, free: Time, baud_bps: u32) -> Time {
+    pub fn answer(
+        &mut self,
+        index: usize,
+        id: u8,
+        error: ErrorCode,
+        free: Time,
+        baud_bps: u32,
+    ) -> Time {
         if !self.answers(index, self.now) {
             return free;
         }
@@ -134,7 +145,7 @@ impl Chain {
         let status = Status {
             id,
             alert: self.slots[index].servo.alert(),
-            error: ErrorCode::from_byte(code),
+            error,
             params: &self.data,
         };
         let Ok(mut len) = status.encode(&mut self.frame).map(|frame| frame.len()) else {

@@ -2,10 +2,10 @@
 
 use super::fault::{Chance, FaultError, FaultKind, FaultSpec, Target};
 use super::line::LineOptions;
-use super::models::addr;
-use super::servo::{Ailments, Servo, hardware_error};
+use super::servo::{Ailments, Servo};
 use super::wire::Wire;
 use crate::base::Time;
+use crate::bus::dynamixel::model::{address, hardware_error};
 use handwave_dynamixel::instruction::Instruction;
 use handwave_dynamixel::{BROADCAST_ID, ErrorCode, Frame, MAX_ID, baud, frame};
 
@@ -213,18 +213,9 @@ impl Chain {
                     self.write_entry(entry.id, entry.address, entry.data, now, baud_bps);
                 }
             }
-            Instruction::SyncRead {
-                address,
-                length,
-                ids,
-            }
-            | Instruction::FastSyncRead {
-                address,
-                length,
-                ids,
-            } => {
-                for &id in ids {
-                    self.ask(id, address, length);
+            Instruction::SyncRead(list) | Instruction::FastSyncRead(list) => {
+                for &id in list.ids {
+                    self.ask(id, list.address, list.length);
                 }
             }
             Instruction::BulkRead(list) | Instruction::FastBulkRead(list) => {
@@ -243,10 +234,10 @@ impl Chain {
             }
         }
         match instruction {
-            Instruction::SyncRead { .. } | Instruction::BulkRead(_) => {
+            Instruction::SyncRead(_) | Instruction::BulkRead(_) => {
                 self.answer_in_turn(now, baud_bps);
             }
-            Instruction::FastSyncRead { .. } | Instruction::FastBulkRead(_) => {
+            Instruction::FastSyncRead(_) | Instruction::FastBulkRead(_) => {
                 self.answer_together(now, baud_bps);
             }
             _ => {}
@@ -266,7 +257,7 @@ impl Chain {
 
     pub fn hears(&self, index: usize, now: Time, baud_bps: u32) -> bool {
         let slot = &self.slots[index];
-        let own = baud::rate(slot.servo.register(addr::BAUD_RATE) as u8).unwrap_or(0);
+        let own = baud::rate(slot.servo.register(address::BAUD_RATE) as u8).unwrap_or(0);
         // The manual tolerates an error below 3 %.
         let same_rate = u64::from(own.abs_diff(baud_bps)) * 100 < u64::from(own) * 3;
         slot.plugged
@@ -294,14 +285,14 @@ impl Chain {
                 continue;
             }
             let servo = &mut self.slots[index].servo;
-            let shadowed = servo.register(addr::SHADOW_ID) == u32::from(id) && id <= MAX_ID;
+            let shadowed = servo.register(address::SECONDARY_ID) == u32::from(id) && id <= MAX_ID;
             self.data.clear();
             if servo.id() == id {
                 // A write of the id or of the rate is still answered as it was asked, but the
                 // return delay is already the new one.
-                let code = servo.execute(instruction, false, now, &mut self.data);
-                if let Some(code) = code {
-                    self.answer(index, id, code, now, baud_bps);
+                let error = servo.execute(instruction, false, now, &mut self.data);
+                if let Some(error) = error {
+                    self.answer(index, id, error, now, baud_bps);
                 }
             } else if shadowed {
                 // The secondary id obeys without answering.
@@ -310,12 +301,12 @@ impl Chain {
         }
     }
 
-    fn refuse(&mut self, id: u8, code: ErrorCode, now: Time, baud_bps: u32) {
+    fn refuse(&mut self, id: u8, error: ErrorCode, now: Time, baud_bps: u32) {
         for index in 0..self.slots.len() {
             let servo = &self.slots[index].servo;
             if servo.id() == id && servo.answers_all() && self.hears(index, now, baud_bps) {
                 self.data.clear();
-                self.answer(index, id, code.to_byte(), now, baud_bps);
+                self.answer(index, id, error, now, baud_bps);
             }
         }
     }
@@ -328,9 +319,9 @@ impl Chain {
                 if self.slots[index].servo.id() == id && self.hears(index, now, baud_bps) {
                     self.data.clear();
                     let servo = &mut self.slots[index].servo;
-                    let code = servo.execute(&Instruction::Ping, true, now, &mut self.data);
-                    if let Some(code) = code {
-                        end = end.max(self.answer(index, id, code, free, baud_bps));
+                    let error = servo.execute(&Instruction::Ping, true, now, &mut self.data);
+                    if let Some(error) = error {
+                        end = end.max(self.answer(index, id, error, free, baud_bps));
                     }
                 }
             }
@@ -341,7 +332,7 @@ impl Chain {
     fn write_entry(&mut self, id: u8, address: u16, data: &[u8], now: Time, baud_bps: u32) {
         for index in 0..self.slots.len() {
             let servo = &self.slots[index].servo;
-            let meant = servo.id() == id || servo.register(addr::SHADOW_ID) == u32::from(id);
+            let meant = servo.id() == id || servo.register(address::SECONDARY_ID) == u32::from(id);
             if meant && self.hears(index, now, baud_bps) {
                 self.slots[index].servo.write_entry(address, data);
             }

@@ -1,18 +1,11 @@
 //! What a servo does on each instruction, and what it answers.
 
-use super::models::addr;
 use super::servo::{Servo, is_backed_up_ram};
-use super::table::{RAM_START, TableError};
+use super::table::TableError;
 use crate::base::Time;
+use crate::bus::dynamixel::model::{RAM_BEGIN, address};
+use handwave_dynamixel::ErrorCode;
 use handwave_dynamixel::instruction::{Backup, FactoryReset, Instruction};
-
-/// Error numbers of the status packet.
-mod error {
-    pub const NONE: u8 = 0;
-    pub const RESULT_FAIL: u8 = 1;
-    pub const INSTRUCTION: u8 = 2;
-    pub const RANGE: u8 = 4;
-}
 
 /// First firmware version that refuses a factory reset of everything by broadcast.
 const BROADCAST_RESET_REFUSED: u32 = 42;
@@ -25,7 +18,7 @@ const ANSWERS_ALL: u32 = 2;
 impl Servo {
     /// Carries out an instruction meant for this servo alone, at `now`.
     ///
-    /// The data of the answer is appended to `data`. Returns the error number (without alert bit)
+    /// The data of the answer is appended to `data`. Returns the error code
     /// to answer with, or `None` when no status is due: broadcast, or the status return level.
     /// A list instruction (sync, bulk) is carried out entry by entry by [`Servo::read_entry`] and
     /// [`Servo::write_entry`] instead.
@@ -35,15 +28,15 @@ impl Servo {
         broadcast: bool,
         now: Time,
         data: &mut Vec<u8>,
-    ) -> Option<u8> {
+    ) -> Option<ErrorCode> {
         // Taken before: a write may change the level it is answered at.
-        let level = self.table.get(addr::STATUS_RETURN_LEVEL);
+        let level = self.table.get(address::STATUS_RETURN_LEVEL);
         let (needed, outcome) = match *instruction {
             Instruction::Ping => {
-                let [low, high] = (self.table.get(addr::MODEL_NUMBER) as u16).to_le_bytes();
-                let firmware = self.table.get(addr::FIRMWARE_VERSION) as u8;
+                let [low, high] = (self.table.get(address::MODEL_NUMBER) as u16).to_le_bytes();
+                let firmware = self.table.get(address::FIRMWARE_VERSION) as u8;
                 data.extend_from_slice(&[low, high, firmware]);
-                return Some(error::NONE);
+                return Some(ErrorCode::None);
             }
             Instruction::Read { address, length } => {
                 if broadcast {
@@ -63,15 +56,15 @@ impl Servo {
             }
             Instruction::ClearMultiTurn => (ANSWERS_ALL, self.clear_multi_turn()),
             Instruction::Backup(what) => (ANSWERS_ALL, self.back_up(what, now)),
-            Instruction::SyncRead { .. }
-            | Instruction::FastSyncRead { .. }
+            Instruction::SyncRead(_)
+            | Instruction::FastSyncRead(_)
             | Instruction::SyncWrite(_)
             | Instruction::BulkRead(_)
             | Instruction::FastBulkRead(_)
             | Instruction::BulkWrite(_) => return None,
         };
         let answers = !broadcast && level >= needed;
-        answers.then(|| outcome.err().unwrap_or(error::NONE))
+        answers.then(|| outcome.err().unwrap_or(ErrorCode::None))
     }
 
     /// Its entry of a sync or bulk read; `None` when its status return level lets it answer pings only.
@@ -81,12 +74,12 @@ impl Servo {
         length: u16,
         now: Time,
         data: &mut Vec<u8>,
-    ) -> Option<u8> {
-        if self.table.get(addr::STATUS_RETURN_LEVEL) < ANSWERS_READS {
+    ) -> Option<ErrorCode> {
+        if self.table.get(address::STATUS_RETURN_LEVEL) < ANSWERS_READS {
             return None;
         }
         let outcome = self.read(address, length, now, data);
-        Some(outcome.err().unwrap_or(error::NONE))
+        Some(outcome.err().unwrap_or(ErrorCode::None))
     }
 
     /// Its entry of a sync or bulk write; never answered, so an error is seen by nobody.
@@ -96,85 +89,97 @@ impl Servo {
 
     /// Whether its status return level lets it answer an instruction that it refuses as a whole.
     pub fn answers_all(&self) -> bool {
-        self.table.get(addr::STATUS_RETURN_LEVEL) >= ANSWERS_ALL
+        self.table.get(address::STATUS_RETURN_LEVEL) >= ANSWERS_ALL
     }
 
     /// Whether its firmware knows the fast reads and the table backup.
     pub fn knows_fast_reads(&self) -> bool {
-        self.table.get(addr::FIRMWARE_VERSION) >= u32::from(self.table.model().fast_read_firmware)
+        self.table.get(address::FIRMWARE_VERSION)
+            >= u32::from(self.table.device().model.fast_reads_since)
     }
 
-    fn read(&mut self, address: u16, length: u16, now: Time, data: &mut Vec<u8>) -> Result<(), u8> {
+    fn read(
+        &mut self,
+        address: u16,
+        length: u16,
+        now: Time,
+        data: &mut Vec<u8>,
+    ) -> Result<(), ErrorCode> {
         self.refresh(now);
-        self.table.read(address, length, data).map_err(|e| e as u8)
+        Ok(self.table.read(address, length, data)?)
     }
 
     fn check(&self, address: u16, data: &[u8]) -> Result<(), TableError> {
         self.table.check_write(address, data, |register, value| {
-            self.check_value(register.addr, value)
+            self.check_value(register.address, value)
         })
     }
 
-    fn write(&mut self, address: u16, data: &[u8]) -> Result<(), u8> {
-        self.check(address, data).map_err(|e| e as u8)?;
+    fn write(&mut self, address: u16, data: &[u8]) -> Result<(), ErrorCode> {
+        self.check(address, data)?;
         self.apply_write(address, data);
         Ok(())
     }
 
-    fn hold(&mut self, address: u16, data: &[u8]) -> Result<(), u8> {
-        self.check(address, data).map_err(|e| e as u8)?;
+    fn hold(&mut self, address: u16, data: &[u8]) -> Result<(), ErrorCode> {
+        self.check(address, data)?;
         self.held_write = Some(address);
         self.held_data.clear();
         self.held_data.extend_from_slice(data);
-        self.table.set(addr::REGISTERED_INSTRUCTION, 1);
+        self.table.set(address::REGISTERED_INSTRUCTION, 1);
         Ok(())
     }
 
-    fn act(&mut self) -> Result<(), u8> {
-        let address = self.held_write.take().ok_or(error::INSTRUCTION)?;
-        self.table.set(addr::REGISTERED_INSTRUCTION, 0);
+    fn act(&mut self) -> Result<(), ErrorCode> {
+        let address = self.held_write.take().ok_or(ErrorCode::Instruction)?;
+        self.table.set(address::REGISTERED_INSTRUCTION, 0);
         let data = std::mem::take(&mut self.held_data);
         let outcome = self.write(address, &data);
         self.held_data = data;
         outcome
     }
 
-    fn factory_reset(&mut self, what: FactoryReset, broadcast: bool, now: Time) -> Result<(), u8> {
-        let firmware = self.table.get(addr::FIRMWARE_VERSION);
+    fn factory_reset(
+        &mut self,
+        what: FactoryReset,
+        broadcast: bool,
+        now: Time,
+    ) -> Result<(), ErrorCode> {
+        let firmware = self.table.get(address::FIRMWARE_VERSION);
         if what == FactoryReset::All && broadcast && firmware >= BROADCAST_RESET_REFUSED {
-            return Err(error::RESULT_FAIL);
+            return Err(ErrorCode::ResultFail);
         }
         self.table.reset(|register| match register {
-            addr::FIRMWARE_VERSION => false,
-            addr::ID => what == FactoryReset::All,
-            addr::BAUD_RATE => what != FactoryReset::KeepIdAndBaud,
+            address::FIRMWARE_VERSION => false,
+            address::ID => what == FactoryReset::All,
+            address::BAUD_RATE => what != FactoryReset::KeepIdAndBaud,
             _ => true,
         });
         self.reboot(now);
         Ok(())
     }
 
-    fn clear_multi_turn(&mut self) -> Result<(), u8> {
+    fn clear_multi_turn(&mut self) -> Result<(), ErrorCode> {
         if self.is_moving() {
-            return Err(error::RESULT_FAIL);
+            return Err(ErrorCode::ResultFail);
         }
         self.clear_turns();
         Ok(())
     }
 
-    fn back_up(&mut self, what: Backup, now: Time) -> Result<(), u8> {
+    fn back_up(&mut self, what: Backup, now: Time) -> Result<(), ErrorCode> {
         if !self.knows_fast_reads() {
-            return Err(error::INSTRUCTION);
+            return Err(ErrorCode::Instruction);
         }
         if self.torque_enabled() {
-            return Err(error::RESULT_FAIL);
+            return Err(ErrorCode::ResultFail);
         }
         match what {
             Backup::Store => self.backup = Some(self.table.clone()),
             Backup::Restore => {
-                let backup = self.backup.take().ok_or(error::RANGE)?;
+                let backup = self.backup.take().ok_or(ErrorCode::DataRange)?;
                 self.table
-                    .copy_from(&backup, |register| register < RAM_START);
+                    .copy_from(&backup, |register| register < RAM_BEGIN);
                 self.reboot(now);
                 self.table.copy_from(&backup, is_backed_up_ram);
                 self.backup = Some(backup);

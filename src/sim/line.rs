@@ -3,7 +3,7 @@
 use super::chain::Chain;
 use super::fault::{Chance, FaultError, FaultKind, FaultSpec, Target};
 use super::servo::Servo;
-use super::table::Model;
+use super::table::Device;
 use super::wire::Pace;
 use crate::base::Time;
 use handwave_dynamixel::{FrameParser, baud};
@@ -76,7 +76,7 @@ impl Line {
     ///
     /// `None` when `baud_bps` is no rate of the baud rate register.
     pub fn commissioned(
-        model: &'static Model,
+        device: &'static Device,
         ids: impl IntoIterator<Item = u8>,
         baud_bps: u32,
         options: LineOptions,
@@ -84,7 +84,7 @@ impl Line {
         let code = baud::code(baud_bps)?;
         let mut line = Self::new(options);
         for id in ids {
-            line.attach(id, Servo::commissioned(model, id, code));
+            line.attach(id, Servo::commissioned(device, id, code));
         }
         Some(line)
     }

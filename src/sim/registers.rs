@@ -1,9 +1,9 @@
 //! What a servo's registers show of it, and what writing them does to it.
 
-use super::models::addr;
-use super::servo::{FULL_PWM, Servo, VELOCITY_UNIT_RAD_S};
+use super::servo::{FULL_PWM, Servo};
 use super::table::TableError;
 use crate::base::Time;
+use crate::bus::dynamixel::model::{POSITION_MODE, VELOCITY_UNIT_RAD_S, address};
 use std::f64::consts::TAU;
 
 /// Pulses from the goal within which a servo counts as in position.
@@ -21,7 +21,7 @@ impl Servo {
         let path_speed = self.profile.speed_rad_s * direction / VELOCITY_UNIT_RAD_S;
         let positioning = self.setpoint.torque_on && self.is_positioning();
         let on_the_way = positioning && !self.profile.arrived(self.setpoint.goal_rad);
-        let threshold = f64::from(self.table.get(addr::MOVING_THRESHOLD));
+        let threshold = f64::from(self.table.get(address::MOVING_THRESHOLD));
         let moving = speed.abs() > threshold || on_the_way;
         let goal = self.to_pulses(self.setpoint.goal_rad);
         let mut status = 0;
@@ -43,24 +43,27 @@ impl Servo {
         let voltage = self.ailments.voltage_v.unwrap_or(11.1);
         let temperature = self.ailments.temperature_c.unwrap_or(32.0);
         for (register, value) in [
-            (addr::REALTIME_TICK, tick as i64),
-            (addr::MOVING, i64::from(moving)),
-            (addr::MOVING_STATUS, status),
+            (address::REALTIME_TICK, tick as i64),
+            (address::MOVING, i64::from(moving)),
+            (address::MOVING_STATUS, status),
             (
-                addr::PRESENT_PWM,
+                address::PRESENT_PWM,
                 (self.motor.duty * direction * FULL_PWM).round() as i64,
             ),
             (
-                addr::PRESENT_LOAD,
+                address::PRESENT_LOAD,
                 (self.motor.effort() * direction * 1000.0).round() as i64,
             ),
-            (addr::PRESENT_VELOCITY, speed.round() as i64),
-            (addr::PRESENT_POSITION, pulses.round() as i64),
-            (addr::VELOCITY_TRAJECTORY, path_speed.round() as i64),
-            (addr::POSITION_TRAJECTORY, path.round() as i64),
-            (addr::PRESENT_INPUT_VOLTAGE, (voltage * 10.0).round() as i64),
-            (addr::PRESENT_TEMPERATURE, temperature.round() as i64),
-            (addr::BACKUP_READY, i64::from(self.backup.is_some())),
+            (address::PRESENT_VELOCITY, speed.round() as i64),
+            (address::PRESENT_POSITION, pulses.round() as i64),
+            (address::VELOCITY_TRAJECTORY, path_speed.round() as i64),
+            (address::POSITION_TRAJECTORY, path.round() as i64),
+            (
+                address::PRESENT_INPUT_VOLTAGE,
+                (voltage * 10.0).round() as i64,
+            ),
+            (address::PRESENT_TEMPERATURE, temperature.round() as i64),
+            (address::BACKUP_READY, i64::from(self.backup.is_some())),
         ] {
             self.table.set(register, value);
         }
@@ -69,21 +72,21 @@ impl Servo {
     /// Takes a write that was checked: stores it and does what the registers in it cause.
     pub(super) fn apply_write(&mut self, address: u16, data: &[u8]) {
         let pulses = self.position_pulses();
-        let mode = self.table.get(addr::OPERATING_MODE);
+        let mode = self.mode();
         let torque_on = self.setpoint.torque_on;
         self.table.store(address, data);
         let touched = |register: u16| {
             (0..data.len()).any(|i| self.table.resolve(address + i as u16) == register)
         };
-        let goal_written = touched(addr::GOAL_POSITION);
-        let mode_written = touched(addr::OPERATING_MODE);
-        if mode_written && self.table.get(addr::OPERATING_MODE) != mode {
+        let goal_written = touched(address::GOAL_POSITION);
+        let mode_written = touched(address::OPERATING_MODE);
+        if mode_written && self.mode() != mode {
             self.change_mode();
         }
-        if !torque_on && self.table.get(addr::TORQUE_ENABLE) != 0 {
+        if !torque_on && self.table.get(address::TORQUE_ENABLE) != 0 {
             if self.shut_down() {
                 // Latched until a reboot; the servo answers, and its torque stays off.
-                self.table.set(addr::TORQUE_ENABLE, 0);
+                self.table.set(address::TORQUE_ENABLE, 0);
             } else {
                 self.profile.angle_rad = self.motor.angle_rad;
                 self.profile.speed_rad_s = 0.0;
@@ -96,9 +99,9 @@ impl Servo {
         // Homing offset and direction change what is shown, not where the shaft is.
         let shift = self.position_pulses() - pulses;
         if shift != 0.0 && !goal_written {
-            let goal = i64::from(self.table.get_signed(addr::GOAL_POSITION));
+            let goal = i64::from(self.table.get_signed(address::GOAL_POSITION));
             self.table
-                .set(addr::GOAL_POSITION, goal + shift.round() as i64);
+                .set(address::GOAL_POSITION, goal + shift.round() as i64);
             self.take_setpoint();
         }
     }
@@ -108,22 +111,23 @@ impl Servo {
         let limit = |addr| i64::from(self.table.get(addr));
         let goal = matches!(
             register,
-            addr::GOAL_PWM | addr::GOAL_VELOCITY | addr::GOAL_POSITION
+            address::GOAL_PWM | address::GOAL_VELOCITY | address::GOAL_POSITION
         );
         if goal && self.watchdog_tripped() {
             return Err(TableError::Range);
         }
         let within = match register {
-            addr::GOAL_PWM => value.abs() <= limit(addr::PWM_LIMIT),
-            addr::GOAL_VELOCITY => value.abs() <= limit(addr::VELOCITY_LIMIT),
-            addr::GOAL_POSITION => match self.table.get(addr::OPERATING_MODE) {
-                3 => {
-                    let allowed = limit(addr::MIN_POSITION_LIMIT)..=limit(addr::MAX_POSITION_LIMIT);
+            address::GOAL_PWM => value.abs() <= limit(address::PWM_LIMIT),
+            address::GOAL_VELOCITY => value.abs() <= limit(address::VELOCITY_LIMIT),
+            address::GOAL_POSITION => match self.mode() {
+                POSITION_MODE => {
+                    let allowed =
+                        limit(address::MIN_POSITION_LIMIT)..=limit(address::MAX_POSITION_LIMIT);
                     allowed.contains(&value)
                 }
                 _ => value.abs() < 256 * 4096,
             },
-            addr::OPERATING_MODE if !self.modes().contains(&(value as u8)) => {
+            address::OPERATING_MODE if !self.modes().contains(&(value as u8)) => {
                 return Err(TableError::Range);
             }
             _ => true,
@@ -141,34 +145,40 @@ impl Servo {
         self.profile.angle_rad = self.motor.angle_rad;
         self.profile.speed_rad_s = 0.0;
         let pulses = self.position_pulses().round() as i64;
-        self.table.set(addr::GOAL_POSITION, pulses);
+        self.table.set(address::GOAL_POSITION, pulses);
         self.take_setpoint();
     }
 
     /// Whether the shaft turns or is on its way.
     pub(super) fn is_moving(&self) -> bool {
         self.speed_rad_s().abs() / VELOCITY_UNIT_RAD_S
-            > f64::from(self.table.get(addr::MOVING_THRESHOLD))
+            > f64::from(self.table.get(address::MOVING_THRESHOLD))
+    }
+
+    fn mode(&self) -> u8 {
+        self.table.get(address::OPERATING_MODE) as u8
     }
 
     fn modes(&self) -> &'static [u8] {
-        self.table.model().modes
+        self.table.device().modes
     }
 
     fn change_mode(&mut self) {
         self.table
-            .reset(|a| (addr::VELOCITY_I_GAIN..=addr::FEEDFORWARD_1ST_GAIN).contains(&a));
-        self.table.set(addr::PROFILE_ACCELERATION, 0);
-        self.table.set(addr::PROFILE_VELOCITY, 0);
-        self.table.set(addr::GOAL_VELOCITY, 0);
-        self.table
-            .set(addr::GOAL_PWM, i64::from(self.table.get(addr::PWM_LIMIT)));
-        if self.table.get(addr::OPERATING_MODE) == 3 {
+            .reset(|a| (address::VELOCITY_I_GAIN..=address::FEEDFORWARD_1ST_GAIN).contains(&a));
+        self.table.set(address::PROFILE_ACCELERATION, 0);
+        self.table.set(address::PROFILE_VELOCITY, 0);
+        self.table.set(address::GOAL_VELOCITY, 0);
+        self.table.set(
+            address::GOAL_PWM,
+            i64::from(self.table.get(address::PWM_LIMIT)),
+        );
+        if self.mode() == POSITION_MODE {
             self.take_setpoint();
             self.clear_turns();
         } else {
             let pulses = self.position_pulses().round() as i64;
-            self.table.set(addr::GOAL_POSITION, pulses);
+            self.table.set(address::GOAL_POSITION, pulses);
         }
     }
 }

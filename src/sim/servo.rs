@@ -1,16 +1,14 @@
 //! One simulated servo: control table, motor, latched errors, bus watchdog, moved along by time alone.
 
-use super::models::addr;
 use super::motor::{Motor, Profile, SUBSTEP_NANOS};
-use super::table::{ControlTable, Model};
+use super::table::{ControlTable, Device};
 use crate::base::Time;
+use crate::bus::dynamixel::model::{PULSES_PER_TURN, RAM_BEGIN, VELOCITY_UNIT_RAD_S, address};
 use std::f64::consts::TAU;
 use std::time::Duration;
 
 /// Radians of one position pulse.
-pub const PULSE_RAD: f64 = TAU / 4096.0;
-/// Radians per second of one velocity unit: 0.229 rev/min.
-pub const VELOCITY_UNIT_RAD_S: f64 = 0.229 * TAU / 60.0;
+pub const PULSE_RAD: f64 = TAU / PULSES_PER_TURN;
 /// Radians per second squared of one profile acceleration unit: 214.577 rev/min^2.
 pub const ACCELERATION_UNIT_RAD_S2: f64 = 214.577 * TAU / 3600.0;
 /// How long a servo is deaf and mute after a reboot.
@@ -25,19 +23,6 @@ pub(super) const FULL_PWM: f64 = 885.0;
 const POSITION_P_DIVISOR: f64 = 100.0;
 /// Velocity error, as a share of the no-load speed, times this is duty in velocity mode.
 const VELOCITY_GAIN: f64 = 4.0;
-/// Bits of Hardware Error Status (70).
-pub mod hardware_error {
-    /// Input voltage out of range.
-    pub const VOLTAGE: u8 = 1 << 0;
-    /// Too hot.
-    pub const OVERHEATING: u8 = 1 << 2;
-    /// Motor encoder.
-    pub const ENCODER: u8 = 1 << 3;
-    /// Electrical shock or too little power.
-    pub const SHOCK: u8 = 1 << 4;
-    /// Overload.
-    pub const OVERLOAD: u8 = 1 << 5;
-}
 
 /// What injected faults do to a servo at present.
 #[derive(Copy, Clone, Debug, Default, PartialEq)]
@@ -89,12 +74,11 @@ pub struct Servo {
 
 impl Servo {
     /// A servo out of the box: id 1, 57,600 baud, return delay 500 us, torque off, position 2048.
-    pub fn factory(model: &'static Model) -> Self {
-        let mut table = ControlTable::new(model);
-        table.set(addr::FIRMWARE_VERSION, i64::from(model.firmware));
+    pub fn factory(device: &'static Device) -> Self {
+        let table = ControlTable::new(device);
         let mut servo = Self {
             table,
-            motor: Motor::new(model.motor, 2048.0 * PULSE_RAD),
+            motor: Motor::new(device.motor, 2048.0 * PULSE_RAD),
             profile: Profile::default(),
             setpoint: Setpoint::default(),
             ailments: Ailments::default(),
@@ -111,17 +95,18 @@ impl Servo {
     }
 
     /// A servo as commissioned for a chain: `id`, the register value for its baud rate, no return delay.
-    pub fn commissioned(model: &'static Model, id: u8, baud_code: u8) -> Self {
-        let mut servo = Self::factory(model);
-        servo.table.set(addr::ID, i64::from(id));
-        servo.table.set(addr::BAUD_RATE, i64::from(baud_code));
-        servo.table.set(addr::RETURN_DELAY_TIME, 0);
+    pub fn commissioned(device: &'static Device, id: u8, baud_code: u8) -> Self {
+        let mut servo = Self::factory(device);
+        servo.table.set(address::ID, i64::from(id));
+        servo.table.set(address::BAUD_RATE, i64::from(baud_code));
+        servo.table.set(address::RETURN_DELAY_TIME, 0);
         servo
     }
 
     /// The same servo with another firmware version; before 45 an XL430 knows no fast reads.
     pub fn with_firmware(mut self, version: u8) -> Self {
-        self.table.set(addr::FIRMWARE_VERSION, i64::from(version));
+        self.table
+            .set(address::FIRMWARE_VERSION, i64::from(version));
         self
     }
 
@@ -129,14 +114,14 @@ impl Servo {
     pub fn with_angle(mut self, angle_rad: f64) -> Self {
         self.motor.angle_rad = 2048.0 * PULSE_RAD + angle_rad;
         let pulses = self.position_pulses().round() as i64;
-        self.table.set(addr::GOAL_POSITION, pulses);
+        self.table.set(address::GOAL_POSITION, pulses);
         self.take_setpoint();
         self
     }
 
     /// Its id.
     pub fn id(&self) -> u8 {
-        self.table.get(addr::ID) as u8
+        self.table.get(address::ID) as u8
     }
 
     /// Whether torque is on.
@@ -176,7 +161,7 @@ impl Servo {
 
     /// Whether a hardware error is latched: the alert bit of every status.
     pub fn alert(&self) -> bool {
-        self.table.get(addr::HARDWARE_ERROR_STATUS) != 0
+        self.table.get(address::HARDWARE_ERROR_STATUS) != 0
     }
 
     /// Sets what faults do to it from now on.
@@ -208,17 +193,20 @@ impl Servo {
     }
 
     fn boot(&mut self) {
-        let restore = self.table.get(addr::STARTUP_CONFIGURATION);
-        self.table.reset(|addr| addr >= super::table::RAM_START);
+        let restore = self.table.get(address::STARTUP_CONFIGURATION);
+        self.table.reset(|register| register >= RAM_BEGIN);
         if restore & 2 != 0
             && let Some(backup) = &self.backup
         {
             self.table.copy_from(backup, is_backed_up_ram);
         }
         self.held_write = None;
-        self.table.set(addr::TORQUE_ENABLE, i64::from(restore & 1));
         self.table
-            .set(addr::GOAL_PWM, i64::from(self.table.get(addr::PWM_LIMIT)));
+            .set(address::TORQUE_ENABLE, i64::from(restore & 1));
+        self.table.set(
+            address::GOAL_PWM,
+            i64::from(self.table.get(address::PWM_LIMIT)),
+        );
         self.take_setpoint();
         self.clear_turns();
         self.latch_errors();
@@ -230,18 +218,18 @@ impl Servo {
             0 => None,
             value => Some(f64::from(value) * scale),
         };
-        let timed = table.get(addr::DRIVE_MODE) & 4 != 0;
-        let reverse = table.get(addr::DRIVE_MODE) & 1 != 0;
-        let goal_pwm = f64::from(table.get_signed(addr::GOAL_PWM));
-        let pwm_limit = f64::from(table.get(addr::PWM_LIMIT));
+        let timed = table.get(address::DRIVE_MODE) & 4 != 0;
+        let reverse = table.get(address::DRIVE_MODE) & 1 != 0;
+        let goal_pwm = f64::from(table.get_signed(address::GOAL_PWM));
+        let pwm_limit = f64::from(table.get(address::PWM_LIMIT));
         let direction = if reverse { -1.0 } else { 1.0 };
-        let gain = f64::from(table.get(addr::POSITION_P_GAIN));
+        let gain = f64::from(table.get(address::POSITION_P_GAIN));
         let before = self.setpoint;
         self.setpoint = Setpoint {
-            mode: table.get(addr::OPERATING_MODE) as u8,
-            torque_on: table.get(addr::TORQUE_ENABLE) != 0,
+            mode: table.get(address::OPERATING_MODE) as u8,
+            torque_on: table.get(address::TORQUE_ENABLE) != 0,
             goal_rad: 0.0,
-            goal_rad_s: f64::from(table.get_signed(addr::GOAL_VELOCITY))
+            goal_rad_s: f64::from(table.get_signed(address::GOAL_VELOCITY))
                 * VELOCITY_UNIT_RAD_S
                 * direction,
             goal_duty: goal_pwm / FULL_PWM * direction,
@@ -250,26 +238,26 @@ impl Servo {
             // In time mode the limits follow from each goal's distance.
             speed: match timed {
                 true => before.speed,
-                false => unit(addr::PROFILE_VELOCITY, VELOCITY_UNIT_RAD_S),
+                false => unit(address::PROFILE_VELOCITY, VELOCITY_UNIT_RAD_S),
             },
             acceleration: match timed {
                 true => before.acceleration,
-                false => unit(addr::PROFILE_ACCELERATION, ACCELERATION_UNIT_RAD_S2),
+                false => unit(address::PROFILE_ACCELERATION, ACCELERATION_UNIT_RAD_S2),
             },
             direction,
         };
         self.setpoint.goal_rad =
-            self.to_angle(f64::from(self.table.get_signed(addr::GOAL_POSITION)));
+            self.to_angle(f64::from(self.table.get_signed(address::GOAL_POSITION)));
     }
 
     /// Time-based profile: the limits that reach the new goal in the milliseconds of registers 112 and 108.
     pub(super) fn time_profile(&mut self) {
-        if self.table.get(addr::DRIVE_MODE) & 4 == 0 {
+        if self.table.get(address::DRIVE_MODE) & 4 == 0 {
             return;
         }
-        let whole_s = f64::from(self.table.get(addr::PROFILE_VELOCITY)) * 1e-3;
+        let whole_s = f64::from(self.table.get(address::PROFILE_VELOCITY)) * 1e-3;
         let ramp_s =
-            (f64::from(self.table.get(addr::PROFILE_ACCELERATION)) * 1e-3).min(0.5 * whole_s);
+            (f64::from(self.table.get(address::PROFILE_ACCELERATION)) * 1e-3).min(0.5 * whole_s);
         let way = (self.setpoint.goal_rad - self.profile.angle_rad).abs();
         let speed = (whole_s > 0.0 && way > 0.0).then(|| way / (whole_s - ramp_s));
         self.setpoint.acceleration = speed.filter(|_| ramp_s > 0.0).map(|v| v / ramp_s);
@@ -277,12 +265,12 @@ impl Servo {
     }
 
     pub(super) fn to_pulses(&self, angle_rad: f64) -> f64 {
-        let offset = f64::from(self.table.get_signed(addr::HOMING_OFFSET));
+        let offset = f64::from(self.table.get_signed(address::HOMING_OFFSET));
         2048.0 + (angle_rad / PULSE_RAD - 2048.0) * self.setpoint.direction + offset
     }
 
     fn to_angle(&self, pulses: f64) -> f64 {
-        let offset = f64::from(self.table.get_signed(addr::HOMING_OFFSET));
+        let offset = f64::from(self.table.get_signed(address::HOMING_OFFSET));
         (2048.0 + (pulses - offset - 2048.0) * self.setpoint.direction) * PULSE_RAD
     }
 
@@ -291,40 +279,40 @@ impl Servo {
     }
 
     pub(super) fn shut_down(&self) -> bool {
-        self.table.get(addr::HARDWARE_ERROR_STATUS) & self.table.get(addr::SHUTDOWN) != 0
+        self.table.get(address::HARDWARE_ERROR_STATUS) & self.table.get(address::SHUTDOWN) != 0
     }
 
     fn latch_errors(&mut self) {
-        let latched =
-            self.table.get(addr::HARDWARE_ERROR_STATUS) | u32::from(self.ailments.hardware_error);
+        let latched = self.table.get(address::HARDWARE_ERROR_STATUS)
+            | u32::from(self.ailments.hardware_error);
         self.table
-            .set(addr::HARDWARE_ERROR_STATUS, i64::from(latched));
+            .set(address::HARDWARE_ERROR_STATUS, i64::from(latched));
         if self.shut_down() {
-            self.table.set(addr::TORQUE_ENABLE, 0);
+            self.table.set(address::TORQUE_ENABLE, 0);
             self.setpoint.torque_on = false;
         }
     }
 
     pub(super) fn watchdog_tripped(&self) -> bool {
-        self.table.get_signed(addr::BUS_WATCHDOG) == -1
+        self.table.get_signed(address::BUS_WATCHDOG) == -1
     }
 
     fn watchdog_expiry(&self) -> Option<Time> {
-        let counts = self.table.get_signed(addr::BUS_WATCHDOG);
+        let counts = self.table.get_signed(address::BUS_WATCHDOG);
         (self.setpoint.torque_on && counts > 0)
             .then(|| self.fed_at + Duration::from_millis(20 * counts.unsigned_abs() as u64))
     }
 
     fn trip_watchdog(&mut self) {
-        self.table.set(addr::BUS_WATCHDOG, -1);
+        self.table.set(address::BUS_WATCHDOG, -1);
         if self.ailments.watchdog_defect {
             return;
         }
         let pulses = self.position_pulses().round() as i64;
-        self.table.set(addr::GOAL_POSITION, pulses);
-        self.table.set(addr::GOAL_VELOCITY, 0);
+        self.table.set(address::GOAL_POSITION, pulses);
+        self.table.set(address::GOAL_VELOCITY, 0);
         if self.setpoint.mode == 16 {
-            self.table.set(addr::GOAL_PWM, 0);
+            self.table.set(address::GOAL_PWM, 0);
         }
         self.take_setpoint();
         self.profile = Profile {
@@ -381,8 +369,10 @@ impl Servo {
 pub(super) fn is_backed_up_ram(register: u16) -> bool {
     matches!(
         register,
-        addr::VELOCITY_I_GAIN
-            ..=addr::FEEDFORWARD_1ST_GAIN | addr::PROFILE_ACCELERATION | addr::PROFILE_VELOCITY
+        address::VELOCITY_I_GAIN
+            ..=address::FEEDFORWARD_1ST_GAIN
+                | address::PROFILE_ACCELERATION
+                | address::PROFILE_VELOCITY
     )
 }
 

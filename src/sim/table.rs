@@ -1,39 +1,48 @@
 //! The control table of one servo: bytes, access rules, ranges, indirect slots.
 
-use super::models::{Row, addr};
 use super::motor::MotorSpec;
-use std::ops::RangeInclusive;
+use crate::bus::dynamixel::model::{Access, Model, RAM_BEGIN, Register, address};
+use handwave_dynamixel::ErrorCode;
+use std::ops::Range;
 
-/// First address of the RAM area; what lies below is EEPROM, locked while torque is on.
-pub const RAM_START: u16 = 64;
-
-/// Why a table refuses an access; the values are the error numbers of the status packet.
+/// Why a table refuses an access.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
-#[repr(u8)]
 pub enum TableError {
     /// The value is outside the register's range.
-    Range = 4,
+    Range,
     /// A register was written in part only.
-    Length = 5,
+    Length,
     /// The value exceeds what a limit register allows.
-    Limit = 6,
+    Limit,
     /// Read-only, unmapped, or EEPROM while torque is on.
-    Access = 7,
+    Access,
 }
 
-/// One register: where it lies, who may write it, what it holds at first and what it may hold.
-#[derive(Clone, Debug)]
-pub struct Register {
-    /// Address of the first byte.
-    pub addr: u16,
-    /// Size in bytes: 1, 2 or 4; little endian.
-    pub size: u8,
-    /// Whether a host may write it.
-    pub writable: bool,
+impl From<TableError> for ErrorCode {
+    fn from(error: TableError) -> Self {
+        match error {
+            TableError::Range => ErrorCode::DataRange,
+            TableError::Length => ErrorCode::DataLength,
+            TableError::Limit => ErrorCode::DataLimit,
+            TableError::Access => ErrorCode::Access,
+        }
+    }
+}
+
+/// One register of a device and what it holds at first.
+#[derive(Copy, Clone, Debug)]
+struct Cell {
+    register: Register,
     /// Value out of the box (EEPROM) or after each boot (RAM).
-    pub initial: i64,
-    /// Values a host may write; registers with a negative lower bound are signed.
-    pub range: RangeInclusive<i64>,
+    initial: i64,
+}
+
+impl Cell {
+    /// Where its bytes lie in the table.
+    fn span(&self) -> Range<usize> {
+        let first = usize::from(self.register.address);
+        first..first + usize::from(self.register.size)
+    }
 }
 
 /// A block of indirect slots: slot `i` at `data + i` stands for the byte that `address + 2 i` names.
@@ -47,115 +56,150 @@ pub struct IndirectBlock {
     pub slots: u16,
 }
 
-/// A servo model: its numbers and its registers.
+impl IndirectBlock {
+    /// Whether an indirect address register lies at `address`.
+    fn covers(&self, address: u16) -> bool {
+        (self.address..self.address + 2 * self.slots).contains(&address)
+    }
+}
+
+/// A servo as a device: its model, and what the host has no need to know of it.
 #[derive(Debug)]
-pub struct Model {
-    /// Name on the command line, such as `xl430-w250`.
-    pub name: &'static str,
-    /// Model number, register 0.
-    pub number: u16,
+pub struct Device {
+    /// Name, number and registers, as the host knows them.
+    pub model: &'static Model,
     /// Firmware version given by default; it knows the fast reads.
     pub firmware: u8,
-    /// First firmware version that knows fast sync read, fast bulk read and table backup.
-    pub fast_read_firmware: u8,
     /// Values of Operating Mode (11) that the model has.
     pub modes: &'static [u8],
     /// What its motor can do.
     pub motor: MotorSpec,
-    pub(super) rows: &'static [Row],
+    /// What registers hold at first, by name; those not named hold 0.
+    pub(super) initial: &'static [(&'static str, i64)],
+    /// Registers where the device takes other values than the host's table says: name, least, greatest.
+    pub(super) ranges: &'static [(&'static str, i64, i64)],
     /// Indirect blocks.
     pub indirect: &'static [IndirectBlock],
+}
+
+impl Device {
+    /// All registers: those of the model, and the slots of the indirect blocks.
+    fn cells(&self) -> Vec<Cell> {
+        let slots = |address: u16| self.indirect.iter().any(|block| block.covers(address));
+        let plain = self.model.registers.iter();
+        let mut cells: Vec<Cell> = plain
+            .filter(|register| !slots(register.address))
+            .map(|register| self.cell(*register))
+            .collect();
+        let end = end_of(&cells, self.indirect);
+        for block in self.indirect {
+            for slot in 0..block.slots {
+                cells.push(Cell {
+                    register: Register {
+                        name: "indirect_address",
+                        address: block.address + 2 * slot,
+                        size: 2,
+                        access: Access::ReadWrite,
+                        min: i64::from(RAM_BEGIN),
+                        max: i64::from(end - 1),
+                        unit: "",
+                    },
+                    initial: i64::from(block.data + slot),
+                });
+                cells.push(Cell {
+                    register: Register {
+                        name: "indirect_data",
+                        address: block.data + slot,
+                        size: 1,
+                        access: Access::ReadWrite,
+                        min: 0,
+                        max: 255,
+                        unit: "",
+                    },
+                    initial: 0,
+                });
+            }
+        }
+        cells
+    }
+
+    fn cell(&self, mut register: Register) -> Cell {
+        let own = self.ranges.iter().find(|(name, ..)| *name == register.name);
+        if let Some(&(_, min, max)) = own {
+            (register.min, register.max) = (min, max);
+        }
+        let initial = self.initial.iter().find(|(name, _)| *name == register.name);
+        let initial = match register.address {
+            address::MODEL_NUMBER => i64::from(self.model.number),
+            address::FIRMWARE_VERSION => i64::from(self.firmware),
+            _ => initial.map_or(0, |(_, value)| *value),
+        };
+        Cell { register, initial }
+    }
+}
+
+/// Address behind the last register.
+fn end_of(cells: &[Cell], indirect: &[IndirectBlock]) -> u16 {
+    let plain = cells
+        .iter()
+        .map(|cell| cell.register.address + u16::from(cell.register.size));
+    plain
+        .chain(indirect.iter().map(|block| block.data + block.slots))
+        .max()
+        .unwrap_or(0)
 }
 
 /// The bytes of one servo's control table.
 #[derive(Clone, Debug)]
 pub struct ControlTable {
-    model: &'static Model,
-    registers: Vec<Register>,
-    /// Index into `registers` plus one, per byte address; 0 = unmapped.
+    device: &'static Device,
+    cells: Vec<Cell>,
+    /// Index into `cells` plus one, per byte address; 0 = unmapped.
     map: Vec<u16>,
     bytes: Vec<u8>,
 }
 
 impl ControlTable {
     /// A table with every register at its initial value.
-    pub fn new(model: &'static Model) -> Self {
-        let mut registers: Vec<Register> = model
-            .rows
-            .iter()
-            .map(|(addr, size, writable, initial, range)| Register {
-                addr: *addr,
-                size: *size,
-                writable: *writable,
-                initial: *initial,
-                range: range.clone(),
-            })
-            .collect();
-        let end = registers
-            .iter()
-            .map(|r| r.addr + u16::from(r.size))
-            .chain(model.indirect.iter().map(|b| b.data + b.slots))
-            .max()
-            .unwrap_or(0);
-        for block in model.indirect {
-            for slot in 0..block.slots {
-                registers.push(Register {
-                    addr: block.address + 2 * slot,
-                    size: 2,
-                    writable: true,
-                    initial: i64::from(block.data + slot),
-                    range: i64::from(RAM_START)..=i64::from(end - 1),
-                });
-                registers.push(Register {
-                    addr: block.data + slot,
-                    size: 1,
-                    writable: true,
-                    initial: 0,
-                    range: 0..=255,
-                });
-            }
-        }
-        let mut map = vec![0; usize::from(end)];
-        for (index, register) in registers.iter().enumerate() {
-            let first = usize::from(register.addr);
-            map[first..first + usize::from(register.size)].fill(index as u16 + 1);
+    pub fn new(device: &'static Device) -> Self {
+        let cells = device.cells();
+        let end = usize::from(end_of(&cells, device.indirect));
+        let mut map = vec![0; end];
+        for (index, cell) in cells.iter().enumerate() {
+            map[cell.span()].fill(index as u16 + 1);
         }
         let mut table = Self {
-            model,
-            registers,
+            device,
+            cells,
             map,
-            bytes: vec![0; usize::from(end)],
+            bytes: vec![0; end],
         };
         table.reset(|_| true);
         table
     }
 
-    /// The model this table belongs to.
-    pub fn model(&self) -> &'static Model {
-        self.model
+    /// The device this table belongs to.
+    pub fn device(&self) -> &'static Device {
+        self.device
     }
 
     /// Puts every register whose address `which` accepts back to its initial value.
     pub fn reset(&mut self, which: impl Fn(u16) -> bool) {
-        for register in &self.registers {
-            if which(register.addr) {
-                let first = usize::from(register.addr);
-                let size = usize::from(register.size);
-                self.bytes[first..first + size]
-                    .copy_from_slice(&register.initial.to_le_bytes()[..size]);
+        for cell in &self.cells {
+            if which(cell.register.address) {
+                let size = usize::from(cell.register.size);
+                self.bytes[cell.span()].copy_from_slice(&cell.initial.to_le_bytes()[..size]);
             }
         }
     }
 
     /// The unsigned value of the register at `addr`; 0 when there is none.
     pub fn get(&self, addr: u16) -> u32 {
-        let Some(register) = self.register_at(addr) else {
+        let Some(cell) = self.cell_at(addr) else {
             return 0;
         };
-        let first = usize::from(register.addr);
         let mut value = [0; 4];
-        let size = usize::from(register.size);
-        value[..size].copy_from_slice(&self.bytes[first..first + size]);
+        value[..usize::from(cell.register.size)].copy_from_slice(&self.bytes[cell.span()]);
         u32::from_le_bytes(value)
     }
 
@@ -171,19 +215,17 @@ impl ControlTable {
 
     /// Sets the register at `addr` without any check: the servo's own hand. No register, no effect.
     pub fn set(&mut self, addr: u16, value: i64) {
-        if let Some(register) = self.register_at(addr) {
-            let first = usize::from(register.addr);
-            let size = usize::from(register.size);
-            self.bytes[first..first + size].copy_from_slice(&value.to_le_bytes()[..size]);
+        if let Some(cell) = self.cell_at(addr) {
+            let (span, size) = (cell.span(), usize::from(cell.register.size));
+            self.bytes[span].copy_from_slice(&value.to_le_bytes()[..size]);
         }
     }
 
     /// Takes over every writable register of `other` whose address `which` accepts.
     pub fn copy_from(&mut self, other: &ControlTable, which: impl Fn(u16) -> bool) {
-        for register in &self.registers {
-            if register.writable && which(register.addr) {
-                let first = usize::from(register.addr);
-                let span = first..first + usize::from(register.size);
+        for cell in &self.cells {
+            if cell.register.access == Access::ReadWrite && which(cell.register.address) {
+                let span = cell.span();
                 if let Some(bytes) = other.bytes.get(span.clone()) {
                     self.bytes[span].copy_from_slice(bytes);
                 }
@@ -193,19 +235,23 @@ impl ControlTable {
 
     /// The register that the byte at `addr` belongs to.
     pub fn register_at(&self, addr: u16) -> Option<&Register> {
+        self.cell_at(addr).map(|cell| &cell.register)
+    }
+
+    fn cell_at(&self, addr: u16) -> Option<&Cell> {
         let index = *self.map.get(usize::from(addr))?;
-        self.registers.get(usize::from(index).checked_sub(1)?)
+        self.cells.get(usize::from(index).checked_sub(1)?)
     }
 
     /// Where the byte at `addr` really lives: indirect data leads to the byte its slot names.
     ///
     /// A slot that names its own or another slot is plain storage.
     pub fn resolve(&self, addr: u16) -> u16 {
-        for block in self.model.indirect {
+        for block in self.device.indirect {
             if (block.data..block.data + block.slots).contains(&addr) {
                 let target = self.get(block.address + 2 * (addr - block.data)) as u16;
                 let is_slot = self
-                    .model
+                    .device
                     .indirect
                     .iter()
                     .any(|b| (b.data..b.data + b.slots).contains(&target));
@@ -248,31 +294,24 @@ impl ControlTable {
         if end > self.bytes.len() {
             return Err(TableError::Access);
         }
-        let torque_on = self.get(addr::TORQUE_ENABLE) != 0;
+        let torque_on = self.get(address::TORQUE_ENABLE) != 0;
         let mut at = 0;
         while at < data.len() {
             let target = self.resolve(addr + at as u16);
             let register = self.register_at(target).ok_or(TableError::Access)?;
-            if !register.writable || (torque_on && register.addr < RAM_START) {
+            let locked = torque_on && register.is_eeprom();
+            if register.access == Access::Read || locked {
                 return Err(TableError::Access);
             }
             let size = usize::from(register.size);
             let bytes = data.get(at..at + size).ok_or(TableError::Length)?;
-            let whole =
-                (0..size).all(|i| self.resolve(addr + (at + i) as u16) == register.addr + i as u16);
+            let whole = (0..size)
+                .all(|i| self.resolve(addr + (at + i) as u16) == register.address + i as u16);
             if !whole {
                 return Err(TableError::Length);
             }
-            let mut raw = [0; 4];
-            raw[..size].copy_from_slice(bytes);
-            let unsigned = u32::from_le_bytes(raw);
-            let value = if *register.range.start() < 0 {
-                let unused_bits = 32 - 8 * size as u32;
-                i64::from(((unsigned << unused_bits) as i32) >> unused_bits)
-            } else {
-                i64::from(unsigned)
-            };
-            if !register.range.contains(&value) {
+            let value = register.decode(bytes);
+            if !(register.min..=register.max).contains(&value) {
                 return Err(TableError::Range);
             }
             value_check(register, value)?;
@@ -321,7 +360,7 @@ mod tests {
         assert_eq!(table.check_write(64, &[2], any), Err(TableError::Range));
         assert_eq!(table.check_write(64, &[], any), Err(TableError::Length));
         assert_eq!(table.check_write(7, &[9], any), Ok(()));
-        table.set(addr::TORQUE_ENABLE, 1);
+        table.set(address::TORQUE_ENABLE, 1);
         assert_eq!(table.check_write(7, &[9], any), Err(TableError::Access));
         let mut out = Vec::new();
         assert_eq!(table.read(660, 3, &mut out), Err(TableError::Access));
@@ -335,14 +374,14 @@ mod tests {
             table.set(168 + 2 * slot, i64::from(132 + slot));
             table.set(578 + 2 * slot, i64::from(116 + slot));
         }
-        table.set(addr::PRESENT_POSITION, 0x0102_0304);
+        table.set(address::PRESENT_POSITION, 0x0102_0304);
         let mut out = Vec::new();
         table.read(224, 5, &mut out).expect("mapped span");
         assert_eq!(out, [4, 3, 2, 1, 0]);
         let goal = 777u32.to_le_bytes();
         assert_eq!(table.check_write(634, &goal, |_, _| Ok(())), Ok(()));
         table.store(634, &goal);
-        assert_eq!(table.get(addr::GOAL_POSITION), 777);
+        assert_eq!(table.get(address::GOAL_POSITION), 777);
         assert_eq!(
             table.check_write(634, &goal[..3], |_, _| Ok(())),
             Err(TableError::Length)

@@ -1,6 +1,7 @@
 //! A line of text every second, for logs and terminals that cannot do more.
 
 use super::watch::{Names, Watch, safety};
+use crate::base::print::say;
 use crate::config::Character;
 use crate::live::CycleRecord;
 
@@ -39,7 +40,7 @@ impl Lines {
             .zip(&record.gestures)
             .map(|(name, g)| format!("{name} {:.2} at {:.2} Hz", g.amplitude, g.frequency_hz))
             .collect();
-        println!(
+        say(format_args!(
             "{:7.2} s  {:<12} {}  [{}]  missing replies {}",
             record.t_s,
             self.names
@@ -49,6 +50,6 @@ impl Lines {
             gestures.join(", "),
             safety(record),
             self.watch.silent,
-        );
+        ));
     }
 }

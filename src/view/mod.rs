@@ -5,6 +5,10 @@ mod draw;
 mod lines;
 #[cfg(feature = "tui")]
 mod terminal;
+#[cfg_attr(
+    not(feature = "tui"),
+    expect(dead_code, reason = "a line shows less than the terminal view")
+)]
 mod watch;
 
 use crate::config::Character;

@@ -6,7 +6,7 @@ use handwave::bus::Port;
 use handwave::sim::line::SharedLine;
 use handwave::sim::models::XL430_W250;
 use handwave::sim::{Line, LineOptions, SimPort};
-use handwave_dynamixel::instruction::Instruction;
+use handwave_dynamixel::instruction::{Instruction, SyncRead};
 use handwave_dynamixel::{BROADCAST_ID, FrameParser, Status, lists};
 use std::sync::Arc;
 use std::time::Duration;
@@ -116,16 +116,16 @@ impl Host {
 
     pub fn sync_read(&mut self, fast: bool, ids: &[u8], address: u16, length: u16) {
         let instruction = match fast {
-            true => Instruction::FastSyncRead {
+            true => Instruction::FastSyncRead(SyncRead {
                 address,
                 length,
                 ids,
-            },
-            false => Instruction::SyncRead {
+            }),
+            false => Instruction::SyncRead(SyncRead {
                 address,
                 length,
                 ids,
-            },
+            }),
         };
         let mut buf = [0; 512];
         let bytes = instruction.encode(BROADCAST_ID, &mut buf).expect("room");

@@ -1,5 +1,7 @@
 //! The baud rate register (address 8) of the X series.
 
+use core::fmt;
+
 /// Rates in bits per second, indexed by the register's value.
 pub const RATES: [u32; 8] = [
     9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000,
@@ -16,6 +18,21 @@ pub fn code(rate: u32) -> Option<u8> {
         .zip(RATES)
         .find(|&(_, known)| known == rate)
         .map(|(code, _)| code)
+}
+
+/// All rates for the reader of a message: `9600, 57600, ...`.
+#[derive(Copy, Clone, Debug)]
+pub struct RateList;
+
+impl fmt::Display for RateList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        for rate in RATES {
+            write!(f, "{separator}{rate}")?;
+            separator = ", ";
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -100,23 +100,9 @@ pub enum Instruction<'a> {
     /// Stores or restores the control table.
     Backup(Backup),
     /// One status from each id, in the order of the list.
-    SyncRead {
-        /// First register.
-        address: u16,
-        /// Bytes from each servo.
-        length: u16,
-        /// Servo ids, one byte each.
-        ids: &'a [u8],
-    },
+    SyncRead(SyncRead<'a>),
     /// One combined status from all ids, in the order of the list.
-    FastSyncRead {
-        /// First register.
-        address: u16,
-        /// Bytes from each servo.
-        length: u16,
-        /// Servo ids, one byte each.
-        ids: &'a [u8],
-    },
+    FastSyncRead(SyncRead<'a>),
     /// Writes to the same registers of several servos; not answered.
     SyncWrite(SyncWrite<'a>),
     /// One status from each servo asked, in order.
@@ -125,6 +111,17 @@ pub enum Instruction<'a> {
     FastBulkRead(BulkRead<'a>),
     /// Writes to different registers of several servos; not answered.
     BulkWrite(BulkWrite<'a>),
+}
+
+/// Parameters of a sync read: what is asked of all.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub struct SyncRead<'a> {
+    /// First register.
+    pub address: u16,
+    /// Bytes from each servo.
+    pub length: u16,
+    /// Servo ids, one byte each, in the order of answering.
+    pub ids: &'a [u8],
 }
 
 /// Parameters of a sync write: what is written where, for each servo.
@@ -327,19 +324,16 @@ impl<'a> Instruction<'a> {
             },
             code::SYNC_READ | code::FAST_SYNC_READ => {
                 let (address, rest) = split_u16(params).ok_or(length)?;
-                let (data_len, ids) = split_u16(rest).ok_or(length)?;
+                let (length, ids) = split_u16(rest).ok_or(length)?;
+                let list = SyncRead {
+                    address,
+                    length,
+                    ids,
+                };
                 Ok(if code == code::SYNC_READ {
-                    Instruction::SyncRead {
-                        address,
-                        length: data_len,
-                        ids,
-                    }
+                    Instruction::SyncRead(list)
                 } else {
-                    Instruction::FastSyncRead {
-                        address,
-                        length: data_len,
-                        ids,
-                    }
+                    Instruction::FastSyncRead(list)
                 })
             }
             code::SYNC_WRITE => {
@@ -388,8 +382,8 @@ impl<'a> Instruction<'a> {
             Instruction::Reboot => code::REBOOT,
             Instruction::ClearMultiTurn => code::CLEAR,
             Instruction::Backup(_) => code::BACKUP,
-            Instruction::SyncRead { .. } => code::SYNC_READ,
-            Instruction::FastSyncRead { .. } => code::FAST_SYNC_READ,
+            Instruction::SyncRead(_) => code::SYNC_READ,
+            Instruction::FastSyncRead(_) => code::FAST_SYNC_READ,
             Instruction::SyncWrite(_) => code::SYNC_WRITE,
             Instruction::BulkRead(_) => code::BULK_READ,
             Instruction::FastBulkRead(_) => code::FAST_BULK_READ,
@@ -425,19 +419,10 @@ impl<'a> Instruction<'a> {
                 });
                 writer.extend(&BACKUP_KEY);
             }
-            Instruction::SyncRead {
-                address,
-                length,
-                ids,
-            }
-            | Instruction::FastSyncRead {
-                address,
-                length,
-                ids,
-            } => {
-                writer.extend_u16(address);
-                writer.extend_u16(length);
-                writer.extend(ids);
+            Instruction::SyncRead(list) | Instruction::FastSyncRead(list) => {
+                writer.extend_u16(list.address);
+                writer.extend_u16(list.length);
+                writer.extend(list.ids);
             }
             Instruction::SyncWrite(SyncWrite {
                 address,

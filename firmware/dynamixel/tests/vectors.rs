@@ -2,7 +2,9 @@
 #![allow(missing_docs)]
 
 use handwave_dynamixel::fast::{self, BlockError, Blocks};
-use handwave_dynamixel::instruction::{Backup, BulkReadEntry, BulkWriteEntry, FactoryReset};
+use handwave_dynamixel::instruction::{
+    Backup, BulkReadEntry, BulkWriteEntry, FactoryReset, SyncRead,
+};
 use handwave_dynamixel::lists::{encode_bulk_read, encode_bulk_write, encode_sync_write};
 use handwave_dynamixel::{BROADCAST_ID, Crc, ErrorCode, Frame, Instruction, Status};
 
@@ -70,20 +72,20 @@ fn single_servo_instructions() {
 fn list_instructions() {
     check(
         BROADCAST_ID,
-        Instruction::SyncRead {
+        Instruction::SyncRead(SyncRead {
             address: 132,
             length: 4,
             ids: &[1, 2],
-        },
+        }),
         "FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA",
     );
     check(
         BROADCAST_ID,
-        Instruction::FastSyncRead {
+        Instruction::FastSyncRead(SyncRead {
             address: 132,
             length: 4,
             ids: &[3, 7, 4],
-        },
+        }),
         "FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2",
     );
 }

@@ -2,7 +2,7 @@
 
 use super::chain::{DynamixelChain, Link};
 use super::client::ClientError;
-use super::model::{HARDWARE_ERRORS, Model, POSITION_MODE, STATE_BYTES, address};
+use super::model::{Model, POSITION_MODE, STATE_BYTES, address, hardware_error};
 use super::servo::position_pulse;
 use crate::base::JointState;
 use crate::bus::BusError;
@@ -75,11 +75,11 @@ impl DynamixelChain {
         self.servos[index].firmware = ping.firmware;
         self.ensure_answers(index)?;
 
-        let [errors] = self.read_register(index, address::HARDWARE_ERROR)?;
+        let [errors] = self.read_register(index, address::HARDWARE_ERROR_STATUS)?;
         if errors != 0 {
             return Err(self.hardware_error(index, errors));
         }
-        let [delay, drive_mode, mode] = self.read_register(index, address::RETURN_DELAY)?;
+        let [delay, drive_mode, mode] = self.read_register(index, address::RETURN_DELAY_TIME)?;
         if mode != POSITION_MODE {
             return Err(self.servo_problem(
                 index,
@@ -200,9 +200,9 @@ impl DynamixelChain {
 
     /// Says which hardware errors are latched and how to get rid of them.
     pub(super) fn hardware_error(&self, index: usize, errors: u8) -> BusError {
-        let names: Vec<&str> = HARDWARE_ERRORS
+        let names: Vec<&str> = hardware_error::NAMES
             .iter()
-            .filter(|(bit, _)| errors & (1 << bit) != 0)
+            .filter(|(bit, _)| errors & bit != 0)
             .map(|(_, name)| *name)
             .collect();
         let what = if names.is_empty() {
@@ -222,7 +222,7 @@ impl DynamixelChain {
 
     /// Goal := present position, torque on and read back, for one servo.
     pub(super) fn arm_servo(&mut self, index: usize) -> Result<(), BusError> {
-        let [errors] = self.read_register(index, address::HARDWARE_ERROR)?;
+        let [errors] = self.read_register(index, address::HARDWARE_ERROR_STATUS)?;
         if errors != 0 {
             return Err(self.hardware_error(index, errors));
         }

@@ -3,7 +3,8 @@
 use super::client::{ClientError, Outcome, Reply};
 use super::master::{Accepted, FAST_BYTES, Master};
 use handwave_dynamixel::fast::{self, Blocks};
-use handwave_dynamixel::{BROADCAST_ID, ErrorCode, Instruction, wire};
+use handwave_dynamixel::instruction::{Instruction, SyncRead};
+use handwave_dynamixel::{BROADCAST_ID, ErrorCode, wire};
 
 impl Master {
     /// Sync read: see [`Client::sync_read`](super::Client::sync_read).
@@ -16,11 +17,11 @@ impl Master {
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
         outcomes.fill(Outcome::NotReached);
-        let request = Instruction::SyncRead {
+        let request = Instruction::SyncRead(SyncRead {
             address,
             length,
             ids,
-        };
+        });
         self.send(|buf| request.encode(BROADCAST_ID, buf))?;
         let size = usize::from(length);
         let answer_bytes = wire::status(size);
@@ -31,7 +32,8 @@ impl Master {
             // the second one behind it had its turn, or its answer would collide with the next request.
             let latest = (turn + 3).min(ids.len());
             let due = self.due(latest as u32, latest * answer_bytes);
-            let deadline = self.deadline(due, ids.len() - turn - 1, size);
+            let behind = ids.len() - turn - 1;
+            let deadline = self.deadline(due, behind, behind * answer_bytes);
             let want = (ids.len() - turn) * answer_bytes;
             let mut heard = turn;
             let bad_crc = self.parser.damage().bad_crc;
@@ -96,11 +98,11 @@ impl Master {
             Ok(blocks_len) if total <= FAST_BYTES / 2 => blocks_len,
             _ => return self.read_in_turn(address, length, ids, data, outcomes),
         };
-        let request = Instruction::FastSyncRead {
+        let request = Instruction::FastSyncRead(SyncRead {
             address,
             length,
             ids,
-        };
+        });
         self.send(|buf| request.encode(BROADCAST_ID, buf))?;
         let filled = self.receive_combined(total, blocks_len, ids.len(), size)?;
         let bytes = &self.combined[..filled];
@@ -173,7 +175,13 @@ impl Master {
             let whole_blocks = got.saturating_sub(fast::PREFIX_LEN) / block;
             let next = wire::fast_status((whole_blocks + 1).min(servos), size);
             let behind = servos.saturating_sub(whole_blocks + 1);
-            let deadline = self.deadline(self.due(1, next), behind, size);
+            // Where not even the first servo speaks, the others are asked again one by one.
+            let again = if whole_blocks == 0 {
+                behind * wire::status(size)
+            } else {
+                wire::fast_status(behind, size)
+            };
+            let deadline = self.deadline(self.due(1, next), behind, again);
             let rest = (total - got).min(FAST_BYTES - filled);
             let place = &mut self.combined[filled..filled + rest];
             let count = self.port.read(place, rest, deadline)?;

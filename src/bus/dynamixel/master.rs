@@ -133,10 +133,10 @@ impl Master {
         self.line_free_at + self.return_delay * delays + self.wire_time(bytes)
     }
 
-    /// Until when the next part of an answer due at `due` is waited for, when `behind` servos with
-    /// answers of `size` bytes would be asked again if it does not come.
-    pub(super) fn deadline(&self, due: Time, behind: usize, size: usize) -> Time {
-        let again = wire::sync_read(behind) + wire::fast_status(behind, size);
+    /// Until when the next part of an answer due at `due` is waited for, when `behind` servos would be
+    /// asked again if it does not come and answer with `answer_bytes` in all.
+    pub(super) fn deadline(&self, due: Time, behind: usize, answer_bytes: usize) -> Time {
+        let again = wire::sync_read(behind) + answer_bytes;
         let spare = self
             .cycle_end
             .map(|end| end - self.wire_time(again) - SPARE_MARGIN);

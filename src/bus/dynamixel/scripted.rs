@@ -3,7 +3,7 @@
 use super::model::{Model, address};
 use crate::base::{Clock, Time, VirtualClock};
 use crate::bus::port::{Port, PortError};
-use handwave_dynamixel::instruction::Instruction;
+use handwave_dynamixel::instruction::{Instruction, SyncRead};
 use handwave_dynamixel::{Crc, ErrorCode, Frame, Status, fast, wire};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -184,11 +184,11 @@ impl Inner {
                 }
                 Vec::new()
             }
-            Instruction::SyncRead {
+            Instruction::SyncRead(SyncRead {
                 address,
                 length,
                 ids,
-            } => {
+            }) => {
                 let mut out = Vec::new();
                 for &id in ids {
                     let Some(puppet) = self.alive().find(|puppet| puppet.id == id) else {
@@ -199,12 +199,12 @@ impl Inner {
                 }
                 out
             }
-            Instruction::FastSyncRead { .. } if !fast => Vec::new(),
-            Instruction::FastSyncRead {
+            Instruction::FastSyncRead(_) if !fast => Vec::new(),
+            Instruction::FastSyncRead(SyncRead {
                 address,
                 length,
                 ids,
-            } => {
+            }) => {
                 let mut crc = Crc::new();
                 let mut buf = [0; 64];
                 let mut out = Vec::new();

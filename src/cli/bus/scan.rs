@@ -1,6 +1,7 @@
 //! `handwave bus scan` and `handwave bus ping`: who is there.
 
 use super::{IdList, model_name, open, say};
+use crate::base::print::warn;
 use crate::bus::BusAddress;
 use crate::bus::address::parse_baud;
 use crate::bus::dynamixel::{Client, ClientError, Ping};
@@ -60,7 +61,7 @@ pub fn scan(args: &ScanArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
             Ok(()) => {}
             // Not every adapter knows every rate.
             Err(error) if rates.len() > 1 => {
-                eprintln!("handwave: {error}");
+                warn(format_args!("handwave: {error}"));
                 continue;
             }
             Err(error) => return Err(error.into()),
