@@ -30,12 +30,29 @@ pub fn request() -> RealTime {
                 .into(),
         );
     }
-    // SAFETY: no pointers; affects paging only.
-    granted.locked = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0;
+    granted.locked = may_lock_all() && lock_all();
     if !granted.locked {
         granted
             .notes
-            .push("memory is not locked (needs CAP_IPC_LOCK or a memlock limit)".into());
+            .push("memory is not locked (needs an unlimited memlock limit): a page may have to be fetched in mid-cycle".into());
     }
     granted
+}
+
+/// Whether locking cannot run into a limit later: with a finite limit an allocation in mid-run would fail.
+#[allow(unsafe_code)]
+fn may_lock_all() -> bool {
+    // SAFETY: the structure outlives the call, which only fills it in; geteuid has no arguments.
+    unsafe {
+        let mut limit: libc::rlimit = std::mem::zeroed();
+        libc::geteuid() == 0
+            || (libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit) == 0
+                && limit.rlim_cur == libc::RLIM_INFINITY)
+    }
+}
+
+#[allow(unsafe_code)]
+fn lock_all() -> bool {
+    // SAFETY: no pointers; affects paging only.
+    unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 }
 }

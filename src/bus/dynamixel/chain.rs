@@ -10,8 +10,11 @@ use crate::base::{JointState, Time};
 use crate::bus::{BusError, CycleReport, ServoBus, TorqueReport};
 use std::time::Duration;
 
-/// How often a request that brought no answer is repeated outside the control cycle.
+/// How often a request that brought no answer is repeated outside the control cycle, at least.
 const TRIES: u32 = 3;
+/// How long it is repeated before and while torque goes on: nothing moves yet, so a busy system or a
+/// servo that is still booting is worth waiting for.
+const START_PATIENCE: Duration = Duration::from_millis(250);
 
 /// Settings of a chain.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,6 +105,8 @@ pub struct DynamixelChain {
     pub(super) servos: Vec<Servo>,
     pub(super) joints: Vec<String>,
     pub(super) notes: Vec<String>,
+    /// How long a request that brings no answer is repeated at present.
+    patience: Duration,
     pub(super) scratch: Scratch,
     /// Fast reads are in use.
     pub(super) fast: bool,
@@ -153,6 +158,7 @@ impl DynamixelChain {
             client,
             options,
             notes: Vec::new(),
+            patience: Duration::ZERO,
             scratch: Scratch {
                 ids: Vec::with_capacity(count),
                 indices: Vec::with_capacity(count),
@@ -219,6 +225,7 @@ impl DynamixelChain {
         mut request: impl FnMut(&mut dyn Client, u8) -> Result<T, ClientError>,
     ) -> Result<T, BusError> {
         let id = self.servos[index].spec.id;
+        let begin = self.client.now();
         let mut tries = 1;
         loop {
             match request(&mut *self.client, id) {
@@ -226,7 +233,12 @@ impl DynamixelChain {
                     self.last_heard = self.client.now();
                     return Ok(answer);
                 }
-                Err(ClientError::Timeout { .. }) if tries < TRIES => tries += 1,
+                Err(ClientError::Timeout { .. })
+                    if tries < TRIES
+                        || self.client.now().saturating_since(begin) < self.patience =>
+                {
+                    tries += 1;
+                }
                 Err(error) => return Err(self.servo_error(index, error)),
             }
         }
@@ -259,9 +271,9 @@ impl ServoBus for DynamixelChain {
     }
 
     fn prepare(&mut self, states: &mut [JointState]) -> Result<(), BusError> {
-        self.client.set_unhurried(true);
+        self.patience = START_PATIENCE;
         let checked = self.check_all(states);
-        self.client.set_unhurried(false);
+        self.patience = Duration::ZERO;
         checked
     }
 
@@ -269,12 +281,12 @@ impl ServoBus for DynamixelChain {
     /// starts the servos' bus watchdogs: from here on [`exchange`](ServoBus::exchange) must be called
     /// more often than the watchdog time.
     fn arm(&mut self) -> Result<(), BusError> {
-        self.client.set_unhurried(true);
+        self.patience = START_PATIENCE;
         let armed = (0..self.servos.len()).try_for_each(|index| self.arm_servo(index));
         // Watchdogs last: while servos are still being set up one by one, none should run.
         let armed = armed
             .and_then(|()| (0..self.servos.len()).try_for_each(|index| self.start_watchdog(index)));
-        self.client.set_unhurried(false);
+        self.patience = Duration::ZERO;
         if armed.is_err() {
             // Better limp than half awake. The first error is the one to tell.
             let _ = self.torque_off();

@@ -126,10 +126,6 @@ pub trait Client: Send {
     fn set_cycle_end(&mut self, end: Option<Time>) {
         let _ = end;
     }
-    /// Tells that nothing hurries, as before the first cycle: a late answer is then waited for longer.
-    fn set_unhurried(&mut self, unhurried: bool) {
-        let _ = unhurried;
-    }
 
     /// Asks one servo who it is.
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError>;

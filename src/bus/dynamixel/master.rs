@@ -33,9 +33,6 @@ pub struct MasterOptions {
     /// Most allowance, and the one to begin with. Default 4 ms: a USB adapter with a latency timer
     /// of 1 ms, or a busy system.
     pub max_allowance: Duration,
-    /// Least allowance for one servo's answer while nothing hurries ([`Client::set_unhurried`]).
-    /// Default 20 ms: a busy system must not be taken for a missing servo.
-    pub unhurried_allowance: Duration,
 }
 
 impl Default for MasterOptions {
@@ -44,7 +41,6 @@ impl Default for MasterOptions {
             return_delay: wire::return_delay(254),
             min_allowance: Duration::from_micros(600),
             max_allowance: Duration::from_millis(4),
-            unhurried_allowance: Duration::from_millis(20),
         }
     }
 }
@@ -60,9 +56,6 @@ pub struct Master {
     /// When the last byte handed to the port leaves it.
     line_free_at: Time,
     cycle_end: Option<Time>,
-    /// While nothing hurries.
-    least_allowance: Duration,
-    unhurried_allowance: Duration,
     pub(super) parser: FrameParser<FRAME_BYTES>,
     /// Bytes of a combined status.
     pub(super) combined: Box<[u8; FAST_BYTES]>,
@@ -82,8 +75,6 @@ impl Master {
             allowance: Allowance::new(options.min_allowance, options.max_allowance),
             line_free_at: Time::ZERO,
             cycle_end: None,
-            least_allowance: Duration::ZERO,
-            unhurried_allowance: options.unhurried_allowance,
             parser: FrameParser::new(),
             combined: Box::new([0; FAST_BYTES]),
             out: Box::new([0; FRAME_BYTES]),
@@ -190,7 +181,7 @@ impl Master {
         let bytes = wire::status(data.len());
         let asked_at = self.port.now();
         let due = self.due(1, bytes);
-        let deadline = due + self.allowance.get().max(self.least_allowance);
+        let deadline = due + self.allowance.get();
         let mut result = None;
         let expected = data.len();
         let answered = self.receive(bytes, deadline, |status| {
@@ -289,14 +280,6 @@ impl Client for Master {
 
     fn set_cycle_end(&mut self, end: Option<Time>) {
         self.cycle_end = end;
-    }
-
-    fn set_unhurried(&mut self, unhurried: bool) {
-        self.least_allowance = if unhurried {
-            self.unhurried_allowance
-        } else {
-            Duration::ZERO
-        };
     }
 
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError> {
