@@ -3,29 +3,9 @@
 mod support;
 
 use support::folder::Folder;
-use support::program::{Ended, handwave};
+use support::program::{Ended, handwave, refused, run_virtual};
 
 const CONFIG: &str = "quadruped.toml";
-
-/// Fails unless the program refused with `code` and said all of `parts`, without starting a run.
-#[track_caller]
-fn refused(ended: Ended, code: i32, parts: &[&str]) {
-    let ended = ended.expect(code);
-    for part in parts {
-        assert!(ended.err.contains(part), "no {part:?} in: {}", ended.err);
-    }
-    assert!(
-        ended.err.len() < 1500,
-        "a message this long is not read: {}",
-        ended.err
-    );
-}
-
-#[track_caller]
-fn run(args: &[&str]) -> Ended {
-    let all = [&["run", "--headless", "--speed", "max"], args].concat();
-    handwave(&all)
-}
 
 /// The configuration with one edit: refused, naming file and line of the edit (of `key` when given).
 #[track_caller]
@@ -34,7 +14,7 @@ fn edited(from: &str, to: &str, parts: &[&str]) {
     let line = folder.edit(CONFIG, from, to);
     let at = format!("{}:{line}", folder.text(CONFIG));
     refused(
-        run(&[&folder.text(CONFIG)]),
+        run_virtual(&[&folder.text(CONFIG)]),
         2,
         &[&[at.as_str()], parts].concat(),
     );
@@ -48,7 +28,7 @@ fn poses(lines: &[String]) -> (Folder, Ended) {
     let head: Vec<&str> = good.lines().take(20).collect();
     let text = format!("{}\n{}\n", head.join("\n"), lines.join("\n"));
     let file = folder.write("take.jsonl", &text);
-    let ended = run(&["--input", &format!("file:{file}")]);
+    let ended = run_virtual(&["--input", &format!("file:{file}")]);
     (folder, ended)
 }
 
@@ -95,7 +75,7 @@ fn nine_bad_samples_in_a_row_are_counted_and_dropped() {
         "take.jsonl",
         &format!("{}\n{}\n", head.join("\n"), lines.join("\n")),
     );
-    let ended = run(&["--json", "--input", &format!("file:{file}")]).expect(0);
+    let ended = run_virtual(&["--json", "--input", &format!("file:{file}")]).expect(0);
     let dropped = &ended.json()["samples_dropped"];
     let total: u64 = dropped.as_object().map_or(0, |d| {
         d.values().filter_map(serde_json::Value::as_u64).sum()
@@ -107,22 +87,42 @@ fn nine_bad_samples_in_a_row_are_counted_and_dropped() {
 fn a_pose_file_that_is_absent_or_no_pose_stream() {
     let folder = Folder::of_configs();
     let absent = folder.text("absent.jsonl");
-    refused(run(&["--input", &format!("file:{absent}")]), 2, &[&absent]);
+    refused(
+        run_virtual(&["--input", &format!("file:{absent}")]),
+        2,
+        &[&absent],
+    );
     let ending = folder.write("take.txt", "x");
     refused(
-        run(&["--input", &format!("file:{ending}")]),
+        run_virtual(&["--input", &format!("file:{ending}")]),
         2,
         &[&ending, ".jsonl", ".csv"],
     );
     let empty = folder.write("empty.jsonl", "");
-    refused(run(&["--input", &format!("file:{empty}")]), 2, &[&empty]);
+    refused(
+        run_virtual(&["--input", &format!("file:{empty}")]),
+        2,
+        &[&empty],
+    );
     let header = folder.write("header.jsonl", "{\"handwave\":\"posse\",\"version\":1}\n");
-    refused(run(&["--input", &format!("file:{header}")]), 2, &[&header]);
+    refused(
+        run_virtual(&["--input", &format!("file:{header}")]),
+        2,
+        &[&header],
+    );
     let points = "{\"handwave\":\"poses\",\"version\":1,\"points\":[\"nose\"],\"dim\":3,\"unit\":\"m\"}\n{\"t\":0,\"p\":[[0,0,0]]}\n";
     let points = folder.write("points.jsonl", points);
-    refused(run(&["--input", &format!("file:{points}")]), 2, &["palm"]);
+    refused(
+        run_virtual(&["--input", &format!("file:{points}")]),
+        2,
+        &["palm"],
+    );
     let csv = folder.write("bad.csv", "time,wrist.x\n0,1\n");
-    refused(run(&["--input", &format!("file:{csv}")]), 2, &[&csv]);
+    refused(
+        run_virtual(&["--input", &format!("file:{csv}")]),
+        2,
+        &[&csv],
+    );
 }
 
 #[test]
@@ -217,7 +217,7 @@ fn a_joint_without_a_servo() {
     folder.edit(CONFIG, "{ name = \"rear_left_hip\",     servo = 7 },", "");
     let file = folder.text(CONFIG);
     refused(
-        run(&[&file]),
+        run_virtual(&[&file]),
         2,
         &[&file, "robot.joint", "rear_left_hip", "servo = ID"],
     );
@@ -261,7 +261,7 @@ fn a_channel_that_the_stream_lacks() {
     folder.edit(CONFIG, "channel = \"yaw\"", "channel = \"yav\"");
     let file = folder.text(CONFIG);
     refused(
-        run(&[&file]),
+        run_virtual(&[&file]),
         2,
         &[
             &file,
@@ -282,7 +282,11 @@ fn a_clip_of_another_robot() {
         .replace("rear_right_knee", "tail");
     folder.write("clips/bow.json", &clip);
     let file = folder.text(CONFIG);
-    refused(run(&[&file]), 2, &[&file, "bow.json", "rear_right_knee"]);
+    refused(
+        run_virtual(&[&file]),
+        2,
+        &[&file, "bow.json", "rear_right_knee"],
+    );
 }
 
 #[test]
@@ -290,14 +294,14 @@ fn a_robot_that_is_no_urdf() {
     let folder = Folder::of_configs();
     folder.write("robots/pup.urdf", "<robot name=\"pup\"><link");
     refused(
-        run(&[&folder.text(CONFIG)]),
+        run_virtual(&[&folder.text(CONFIG)]),
         2,
         &[&folder.text(CONFIG), "robot.urdf"],
     );
     let folder = Folder::of_configs();
     folder.edit("robots/pup.urdf", "lower=\"-0.7\"", "lower=\"nan\"");
     refused(
-        run(&[&folder.text(CONFIG)]),
+        run_virtual(&[&folder.text(CONFIG)]),
         2,
         &["robot.urdf", "front_left_hip"],
     );
@@ -346,88 +350,4 @@ fn numbers_out_of_range() {
         "range = [0.6, 0.6]",
         &["layer.range"],
     );
-}
-
-#[test]
-fn bad_options() {
-    refused(
-        run(&["--bus", "dynamxel:/dev/ttyUSB0"]),
-        2,
-        &["--bus", "dynamxel", "dynamixel"],
-    );
-    refused(
-        run(&["--bus", "dynamixel:/dev/x@fast"]),
-        2,
-        &["--bus", "fast"],
-    );
-    refused(
-        run(&["--fault", "7:silnt@1s"]),
-        2,
-        &["--fault", "did you mean 'silent'"],
-    );
-    refused(
-        run(&["--fault", "99:silent@1s"]),
-        2,
-        &["--fault", "no servo 99", "12"],
-    );
-    refused(run(&["--fault", "7:silent"]), 2, &["--fault", "no time"]);
-    refused(run(&["--rate", "5000"]), 2, &["--rate", "5000", "10..2000"]);
-    refused(run(&["--rate", "nan"]), 2, &["--rate", "10..2000"]);
-    refused(run(&["--rate", "fast"]), 2, &["--rate", "fast"]);
-    refused(run(&["--input", "flie:x.jsonl"]), 2, &["flie", "file:PATH"]);
-    refused(
-        run(&["--targets", "/nowhere/at/all/a.csv"]),
-        2,
-        &["--targets", "/nowhere/at/all/a.csv"],
-    );
-    let virtual_run = ["run", "--headless", "--speed", "max"];
-    let with = |more: &[&str]| handwave(&[&virtual_run[..], more].concat());
-    refused(with(&["--duration=-1"]), 2, &["--duration"]);
-    refused(with(&["--duration", "nan"]), 2, &["--duration", "above 0"]);
-    refused(with(&["--input", "udp://127.0.0.1:9000"]), 2, &["udp"]);
-    refused(
-        with(&["--bus", "dynamixel:/dev/null@1000000"]),
-        2,
-        &["--speed max", "--bus sim"],
-    );
-    let faulty = [
-        "run",
-        "--headless",
-        "--bus",
-        "dynamixel:/dev/null@1000000",
-        "--fault",
-        "7:silent@1s",
-    ];
-    refused(handwave(&faulty), 2, &["--fault", "simulated"]);
-}
-
-#[test]
-fn a_port_that_is_absent_is_a_bus_failure() {
-    let folder = Folder::empty();
-    let port = folder.text("no_port");
-    let bus = format!("dynamixel:{port}@1000000");
-    refused(handwave(&["run", "--headless", "--bus", &bus]), 3, &[&port]);
-    refused(handwave(&["bus", "scan", &bus]), 3, &[&port]);
-}
-
-#[test]
-fn usage() {
-    refused(handwave(&["rum"]), 2, &["rum", "run"]);
-    refused(
-        handwave(&["run", "--headles"]),
-        2,
-        &["--headles", "--headless"],
-    );
-    refused(
-        handwave(&["run", "--speed", "slow"]),
-        2,
-        &["slow", "real", "max"],
-    );
-    refused(
-        handwave(&["run", "/nowhere/config.toml"]),
-        2,
-        &["/nowhere/config.toml"],
-    );
-    refused(handwave(&["run", "/nowhere"]), 2, &["/nowhere"]);
-    refused(handwave(&["sim", "dynamixel"]), 2, &["--link"]);
 }

@@ -288,6 +288,7 @@ fn a_servo_that_is_silent_for_a_second_is_named_and_nothing_else_changes() {
     }
 }
 
+/// The legs walk from about 6 s on.
 #[test]
 fn every_servo_fault_is_borne() {
     let list = handwave(&["sim", "dynamixel", "--list-faults"]).expect(0);
@@ -302,8 +303,8 @@ fn every_servo_fault_is_borne() {
     assert!(servo_faults.len() >= 12, "{servo_faults:?}");
     let mut report = String::new();
     for name in servo_faults {
-        let spec = format!("5:{name}@2.5s..3.2s");
-        let run = run_for(&["--fault", &spec, "--duration", "4"], &[0, 3, 4]);
+        let spec = format!("5:{name}@6.5s..7.2s");
+        let run = run_for(&["--fault", &spec, "--duration", "8.5"], &[0, 3, 4]);
         let watch = inside(&run.targets, 200.0);
         report += &format!(
             "{spec}: exit {:?}, {} faults, {}\n",
@@ -326,8 +327,8 @@ fn a_noisy_line_is_borne() {
         "echo",
     ];
     for name in noise {
-        let spec = format!("bus:{name}@2.5s..3.5s");
-        let run = run_for(&["--fault", &spec, "--duration", "4"], &[0, 3, 4]);
+        let spec = format!("bus:{name}@6.5s..7.5s");
+        let run = run_for(&["--fault", &spec, "--duration", "8.5"], &[0, 3, 4]);
         let watch = inside(&run.targets, 200.0);
         println!(
             "{spec}: exit {:?}, {} bus errors, {}",

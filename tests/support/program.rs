@@ -163,3 +163,24 @@ pub fn wait_for<T>(what: &str, at_most: Duration, mut answer: impl FnMut() -> Op
         std::thread::park_timeout(Duration::from_millis(5));
     }
 }
+
+/// Fails unless the program refused with `code` and said all of `parts`, without starting a run.
+#[track_caller]
+pub fn refused(ended: Ended, code: i32, parts: &[&str]) {
+    let ended = ended.expect(code);
+    for part in parts {
+        assert!(ended.err.contains(part), "no {part:?} in: {}", ended.err);
+    }
+    assert!(
+        ended.err.len() < 1500,
+        "a message this long is not read: {}",
+        ended.err
+    );
+}
+
+/// `handwave run` in virtual time.
+#[track_caller]
+pub fn run_virtual(args: &[&str]) -> Ended {
+    let all = [&["run", "--headless", "--speed", "max"], args].concat();
+    handwave(&all)
+}
