@@ -60,10 +60,10 @@ pub struct RunOptions {
     #[arg(long, value_name = "BUS")]
     bus: Option<String>,
     /// Control cycles per second
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Bring the run to its end after this many seconds
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// real: by the clock; max: time comes from the input, as fast as it computes
     #[arg(long, value_enum, default_value_t = Speed::Real)]

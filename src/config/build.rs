@@ -174,9 +174,9 @@ impl Character {
     /// The animator, with layers bound to the channels of `front`.
     pub fn animator(&self, front: &FrontEnd) -> Result<Animator, ConfigError> {
         let ranges = joint_ranges(&self.limits);
-        let wrong = |key: &str, problem: String| ConfigError {
+        let wrong = |key: &str, line: Option<usize>, problem: String| ConfigError {
             file: self.config_name.clone(),
-            line: None,
+            line,
             key: key.into(),
             problem,
         };
@@ -185,16 +185,17 @@ impl Character {
             .iter()
             .map(|c| {
                 MotionClass::new(&c.name, c.examples.clone(), ranges.clone())
-                    .map_err(|e| wrong("class", e.to_string()))
+                    .map_err(|e| wrong("class", None, e.to_string()))
             })
             .collect::<Result<Vec<_>, _>>()?;
         let mut layers = Vec::new();
         for parts in &self.layers {
             let channel = front.channel_index(&parts.channel).ok_or_else(|| {
                 let names = front.channel_names();
-                let hint = hint(&parts.channel, names.iter().map(String::as_str));
+                let hint = hint(&parts.channel, front.channel_aliases());
                 wrong(
                     "layer.channel",
+                    Some(parts.line),
                     format!(
                         "layer {}: the pose stream has no channel {:?}{hint} It has: {}",
                         parts.name,
@@ -207,6 +208,7 @@ impl Character {
                 .ok_or_else(|| {
                     wrong(
                         "layer.clip",
+                        Some(parts.line),
                         format!("layer {}: a layer needs a path, not a cycle", parts.name),
                     )
                 })?;

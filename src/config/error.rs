@@ -91,7 +91,8 @@ impl Pointer<'_> {
         }
     }
 
-    fn line_of(&self, offset: usize) -> usize {
+    /// Line of a byte offset, from 1.
+    pub fn line_of(&self, offset: usize) -> usize {
         let end = offset.min(self.text.len());
         self.text.as_bytes()[..end]
             .iter()

@@ -32,6 +32,8 @@ impl ClassParts {
 pub(super) struct LayerParts {
     pub(super) name: String,
     pub(super) channel: String,
+    /// Line of the channel in the configuration, for messages.
+    pub(super) line: usize,
     pub(super) map: ChannelMap,
     pub(super) clip: Clip,
 }
@@ -229,6 +231,7 @@ pub(super) fn layer_parts(
     Ok(LayerParts {
         name: entry.name.clone(),
         channel: entry.channel.get_ref().clone(),
+        line: at.line_of(entry.channel.span().start),
         map: ChannelMap {
             low,
             high,

@@ -342,6 +342,14 @@ impl FrontEnd {
             })
     }
 
+    /// Names by which channels may be asked for: as listed, and global ones without their unit.
+    pub fn channel_aliases(&self) -> impl Iterator<Item = &str> {
+        let stems = GLOBAL_CHANNELS
+            .iter()
+            .filter_map(|known| known.rsplit_once('_').map(|(stem, _)| stem));
+        stems.chain(self.channel_names.iter().map(String::as_str))
+    }
+
     /// Names of all channels, in the order of [`FrontEnd::channel`].
     pub fn channel_names(&self) -> &[String] {
         &self.channel_names

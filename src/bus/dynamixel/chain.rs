@@ -15,6 +15,8 @@ const TRIES: u32 = 3;
 /// How long it is repeated before and while torque goes on: nothing moves yet, so a busy system or a
 /// servo that is still booting is worth waiting for.
 const START_PATIENCE: Duration = Duration::from_millis(250);
+/// After an answer that did not come in time, the line is listened to until it was quiet this long.
+const QUIET: Duration = Duration::from_millis(10);
 
 /// Settings of a chain.
 #[derive(Clone, Debug, PartialEq)]
@@ -241,6 +243,10 @@ impl DynamixelChain {
                         || self.client.now().saturating_since(begin) < self.patience =>
                 {
                     tries += 1;
+                    if !self.patience.is_zero() {
+                        let settled = self.client.settle(QUIET);
+                        settled.map_err(|error| self.servo_error(index, error))?;
+                    }
                 }
                 Err(error) => return Err(self.servo_error(index, error)),
             }

@@ -127,6 +127,13 @@ pub trait Client: Send {
         let _ = end;
     }
 
+    /// Throws away what comes in until nothing came for `quiet`, at most ten times that long: an answer
+    /// that was given up must not be taken for that to the next request.
+    fn settle(&mut self, quiet: Duration) -> Result<(), ClientError> {
+        let _ = quiet;
+        Ok(())
+    }
+
     /// Asks one servo who it is.
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError>;
     /// Asks all servos who they are, about a second at 1 Mbaud, and hands over who answered.

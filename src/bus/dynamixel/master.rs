@@ -282,6 +282,19 @@ impl Client for Master {
         self.cycle_end = end;
     }
 
+    fn settle(&mut self, quiet: Duration) -> Result<(), ClientError> {
+        let end = self.port.now() + quiet * 10;
+        let mut late = [0; 256];
+        loop {
+            let deadline = end.min(self.port.now() + quiet);
+            let count = self.port.read(&mut late, 1, deadline)?;
+            self.damaged += count as u64;
+            if count == 0 || self.port.now() >= end {
+                return Ok(());
+            }
+        }
+    }
+
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError> {
         self.send(|buf| Instruction::Ping.encode(id, buf))?;
         let mut params = [0; 3];
