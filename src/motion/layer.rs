@@ -56,7 +56,7 @@ pub struct Layer {
 }
 
 /// Share of the joints' range that a layer may use while other motion goes on.
-const LAYER_SHARE: f64 = 0.08;
+const LAYER_SHARE: f64 = 0.18;
 
 impl Layer {
     /// A layer that adds the path `clip` (weight 1 = its end), driven by `channel`.

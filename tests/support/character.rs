@@ -33,7 +33,20 @@ pub struct Player {
 impl Player {
     /// At rest with every joint at zero. The samples come on the run's clock from `begins_s` on.
     pub fn new(character: &Character, begins_s: f64) -> Self {
+        Self::with(character, begins_s, |_, _| {})
+    }
+
+    /// The same with every sample changed by `change`, which is also given the time since the first one.
+    pub fn with(
+        character: &Character,
+        begins_s: f64,
+        change: impl Fn(f64, &mut PoseSample),
+    ) -> Self {
         let (header, mut samples) = performance(character);
+        let start = samples[0].t;
+        for sample in &mut samples {
+            change(sample.t - start, sample);
+        }
         let first = samples[0].t;
         for sample in &mut samples {
             sample.t += begins_s - first;
