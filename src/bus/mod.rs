@@ -31,6 +31,10 @@ pub trait ServoBus: Send {
     /// Makes the present position the goal of every servo, then turns torque on and reads it back.
     fn arm(&mut self) -> Result<(), BusError>;
 
+    /// Where the goal of every servo stands, rad: after [`ServoBus::arm`] the position it was armed at,
+    /// from which a ramp has to begin.
+    fn goals(&self, out_rad: &mut [f64]);
+
     /// One control cycle: sends `targets_rad`, reads effort, velocity and position back.
     ///
     /// A servo that did not answer keeps its old state (its `measured_at` tells) and is counted in

@@ -115,6 +115,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             "--rate {rate_hz} is not in 10..2000 Hz"
         )));
     }
+    character
+        .check_watchdog(rate_hz)
+        .map_err(|problem| Failure::input(format!("--rate {rate_hz}: {problem}")))?;
     if let Some(d) = options.duration
         && !(d > 0.0)
     {
@@ -173,10 +176,8 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             ran.map_err(Failure::input)?
         }
     };
-    if let Some(targets) = onlooker.targets {
-        targets.finish().map_err(Failure::input)?;
-    }
-    conclude(options, report, &character)
+    let written = onlooker.targets.map_or(Ok(()), TargetsFile::finish);
+    conclude(options, report, written, &character)
 }
 
 fn faults(options: &RunOptions, character: &Character) -> Result<Vec<FaultSpec>, Failure> {
@@ -237,6 +238,7 @@ fn session(
 fn conclude(
     options: &RunOptions,
     report: Report,
+    written: Result<(), String>,
     character: &Character,
 ) -> Result<ExitStatus, Failure> {
     if options.json {
@@ -248,18 +250,42 @@ fn conclude(
         ));
     }
     let end = |status, message: String| Failure { status, message };
+    // The gravest first: what became of the robot outranks what was wrong with a file.
+    let interrupted = matches!(report.ending, Ending::Interrupted);
+    match report.ending {
+        Ending::Bus(error) => return Err(Failure::bus(error)),
+        Ending::SafetyStop(reason) => {
+            return Err(end(
+                ExitStatus::SafetyStop,
+                format!("safety stop: {reason}"),
+            ));
+        }
+        Ending::Complete | Ending::Interrupted => {}
+    }
+    match &report.torque {
+        Some(Ok(torque)) if !torque.unconfirmed.is_empty() => {
+            let joints: Vec<&str> = torque.unconfirmed.iter().map(|(j, _)| j.as_str()).collect();
+            return Err(Failure::bus(format!(
+                "torque is not confirmed off: {}. Take the power off before you touch the robot",
+                joints.join(", ")
+            )));
+        }
+        Some(Err(error)) => {
+            return Err(Failure::bus(format!(
+                "torque could not be read back: {error}. Take the power off before you touch the robot"
+            )));
+        }
+        Some(Ok(_)) | None => {}
+    }
     if let Some(error) = report.pose_error {
         return Err(Failure::input(error));
     }
-    match report.ending {
-        Ending::Complete => Ok(ExitStatus::Done),
-        Ending::Interrupted => Ok(ExitStatus::Interrupted),
-        Ending::SafetyStop(reason) => Err(end(
-            ExitStatus::SafetyStop,
-            format!("safety stop: {reason}"),
-        )),
-        Ending::Bus(error) => Err(Failure::bus(error)),
-    }
+    written.map_err(Failure::input)?;
+    Ok(if interrupted {
+        ExitStatus::Interrupted
+    } else {
+        ExitStatus::Done
+    })
 }
 
 /// Writes targets and feeds the view.

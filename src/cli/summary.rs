@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 /// The summary as one JSON object.
 pub fn to_json(report: &Report, character: &Character) -> Value {
     let stats = &report.stats;
+    let torque = report.torque.as_ref().and_then(|t| t.as_ref().ok());
     let faults: Vec<Value> = stats
         .faults
         .iter()
@@ -39,8 +40,9 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
         "pose_to_wire_us": stats.pose_to_wire.percentiles(), "bus_cycle_us": stats.exchange.percentiles(),
         "step_us": stats.step.percentiles(), "lateness_us": stats.lateness.percentiles(),
         "records_lost": report.records_lost,
-        "torque_off": report.torque.as_ref().map(|t| t.confirmed_off.clone()),
-        "torque_unconfirmed": report.torque.as_ref().map(|t| t.unconfirmed.clone()),
+        "torque_off": torque.map(|t| t.confirmed_off.clone()),
+        "torque_unconfirmed": torque.map(|t| t.unconfirmed.clone()),
+        "torque_error": report.torque.as_ref().and_then(|t| t.as_ref().err()).map(ToString::to_string),
     })
 }
 
@@ -108,16 +110,18 @@ pub fn to_text(report: &Report, character: &Character) -> String {
 }
 
 fn torque_lines(report: &Report, character: &Character) -> String {
-    let mut text = String::new();
-    if let Some(torque) = &report.torque {
-        text += &format!(
-            "torque        off, read back from {} of {} servos\n",
-            torque.confirmed_off.len(),
-            character.joints.len()
-        );
-        for (joint, reason) in &torque.unconfirmed {
-            text += &format!("torque        NOT confirmed off: joint {joint}: {reason}\n");
-        }
+    let torque = match &report.torque {
+        None => return "torque        stays on, as safety.on_exit says\n".into(),
+        Some(Err(error)) => return format!("torque        UNKNOWN, not read back: {error}\n"),
+        Some(Ok(torque)) => torque,
+    };
+    let mut text = format!(
+        "torque        off, read back from {} of {} servos\n",
+        torque.confirmed_off.len(),
+        character.joints.len()
+    );
+    for (joint, reason) in &torque.unconfirmed {
+        text += &format!("torque        NOT confirmed off: joint {joint}: {reason}\n");
     }
     text
 }

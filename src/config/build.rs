@@ -1,7 +1,7 @@
 //! From a configuration to checked parts: every file read, every name resolved, every number in range.
 
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, OnExit, OnLost};
+use super::file::{CharacterFile, OnExit, OnLost, OnServoFault};
 use super::files::Files;
 use super::motion::{
     ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts, read,
@@ -14,6 +14,8 @@ use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet};
 use crate::motion::Animator;
 use crate::motion::class::MotionClass;
+use crate::motion::clip::ClipKind;
+use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
 use crate::motion::layer::Layer;
 use crate::motion::range::JointRange;
@@ -77,6 +79,8 @@ pub struct Safety {
     pub lost_s: f64,
     /// What then happens.
     pub on_lost: OnLost,
+    /// What happens when a servo falls out.
+    pub on_servo_fault: OnServoFault,
     /// Torque at the end.
     pub on_exit: OnExit,
 }
@@ -101,6 +105,14 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let gestures = gesture_set(&files, &file, &at)?;
     let classes = class_parts(&files, &file, &joints, &gestures, &at)?;
     for class in &classes {
+        for example in &class.examples {
+            if let Some(problem) = outside_limits(&example.clip, &model).first() {
+                return Err(at.key(
+                    "class.clip",
+                    format!("clip {}: {problem}", example.clip.name),
+                ));
+            }
+        }
         MotionClass::new(&class.name, class.examples.clone(), ranges.clone())
             .map_err(|e| at.key("class.name", e))?;
     }
@@ -113,6 +125,17 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let end_pose = match &file.safety.end_clip {
         Some(path) => {
             let clip = clip(&files, path, "safety.end_clip", &joints, &at)?;
+            if clip.kind != ClipKind::Path {
+                let problem = format!(
+                    "clip {} is a cycle; the end pose is the end of a path",
+                    clip.name
+                );
+                return Err(at.at(path.span(), "safety.end_clip", problem));
+            }
+            if let Some(problem) = outside_limits(&clip, &model).first() {
+                let problem = format!("clip {}: {problem}", clip.name);
+                return Err(at.at(path.span(), "safety.end_clip", problem));
+            }
             let mut pose = vec![0.0; joints.len()];
             clip.pose(1.0, &mut pose);
             Some(pose)
@@ -135,7 +158,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     };
     let bus = file.bus.bus.parse().map_err(|e| at.key("bus.bus", e))?;
     let safety = &file.safety;
-    Ok(Character {
+    let character = Character {
         name: file.name.clone(),
         config_name: file_name.clone(),
         source: file.input.source.get_ref().clone(),
@@ -150,6 +173,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
             coast_s: safety.coast_s,
             lost_s: safety.lost_s,
             on_lost: safety.on_lost,
+            on_servo_fault: safety.on_servo_fault,
             on_exit: safety.on_exit,
         },
         bus,
@@ -167,7 +191,11 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         end_pose,
         graph,
         layers,
-    })
+    };
+    character
+        .check_watchdog(character.rate_hz)
+        .map_err(|problem| at.key("bus.watchdog_ms", problem))?;
+    Ok(character)
 }
 
 impl Character {
@@ -221,6 +249,19 @@ impl Character {
             classes,
             graph,
             layers,
+        ))
+    }
+
+    /// Whether the servos' watchdog leaves room for cycles at `rate_hz`: one that runs out between two
+    /// cycles would stop the robot again and again.
+    pub fn check_watchdog(&self, rate_hz: f64) -> Result<(), String> {
+        let least_ms = (3.0 * 1000.0 / rate_hz + 20.0).ceil();
+        if self.watchdog_ms == 0 || f64::from(self.watchdog_ms) >= least_ms {
+            return Ok(());
+        }
+        Err(format!(
+            "at {rate_hz} Hz the servos' watchdog needs at least {least_ms} ms (three cycles and 20 ms); bus.watchdog_ms is {}. 0 turns it off",
+            self.watchdog_ms
         ))
     }
 

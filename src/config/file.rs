@@ -199,7 +199,10 @@ pub struct SafetyEntry {
     /// `idle` or `stop`.
     #[serde(default)]
     pub on_lost: OnLost,
-    /// Torque of a servo at the end of a run; only `torque_off` in this version.
+    /// A servo latches a hardware error or comes back without torque: `stop` or `continue`.
+    #[serde(default)]
+    pub on_servo_fault: OnServoFault,
+    /// Torque at the end of a run: `torque_off` or `hold`.
     #[serde(default)]
     pub on_exit: OnExit,
 }
@@ -213,6 +216,17 @@ pub enum OnLost {
     Idle,
     /// Lie down, torque off, exit code 4.
     Stop,
+}
+
+/// What happens when a servo falls out.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnServoFault {
+    /// Lie down, torque off, exit code 4.
+    #[default]
+    Stop,
+    /// Report it and play on with the others.
+    Continue,
 }
 
 /// Servo state at the end of a run.
@@ -245,6 +259,7 @@ impl Default for SafetyEntry {
             coast_s: coast(),
             lost_s: one(),
             on_lost: OnLost::default(),
+            on_servo_fault: OnServoFault::default(),
             on_exit: OnExit::default(),
         }
     }

@@ -4,7 +4,7 @@ use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, LayerEntry};
 use super::files::Files;
 use crate::base::suggest::hint;
-use crate::gesture::GestureSet;
+use crate::gesture::{GestureKind, GestureSet};
 use crate::motion::class::Example;
 use crate::motion::clip::{Clip, ClipFile, ClipKind};
 use crate::motion::graph::GraphOptions;
@@ -127,10 +127,34 @@ pub(super) fn class_parts(
                     ),
                 ));
             }
+            let repeats = gestures.gestures[gesture].kind == GestureKind::Cyclic;
+            if repeats != (clip.kind == ClipKind::Cycle) {
+                return Err(at.at(
+                    entry.file.span(),
+                    "class.clip",
+                    format!(
+                        "clip {} is a {}, gesture {wanted:?} is {}; cyclic gestures drive cycles, non-cyclic ones paths",
+                        clip.name,
+                        if clip.kind == ClipKind::Cycle { "cycle" } else { "path" },
+                        gestures.gestures[gesture].kind.name(),
+                    ),
+                ));
+            }
             examples.push(Example {
                 clip,
                 parameters: [entry.amplitude, entry.frequency_hz],
             });
+        }
+        let at_rest = examples.iter().filter(|e| e.parameters[0] == 0.0).count();
+        let cyclic = examples.iter().any(|e| e.clip.kind == ClipKind::Cycle);
+        if cyclic && at_rest != 1 {
+            return Err(at.at(
+                class.name.span(),
+                "class.clip",
+                format!(
+                    "{at_rest} clips have amplitude = 0; a cyclic class needs exactly one, which is played while nothing is performed (`handwave clip gait --gait stand` makes it)"
+                ),
+            ));
         }
         parts.push(ClassParts {
             name: name.clone(),
@@ -195,6 +219,15 @@ pub(super) fn graph_parts(
         blend_s: graph.blend_s.unwrap_or(standard.blend_s),
         idle_s: graph.idle_s.unwrap_or(standard.idle_s),
     };
+    if options.abort >= options.rise {
+        return Err(at.key(
+            "graph.abort",
+            format!(
+                "abort {} must lie below rise {}, or a transition is given up as soon as it starts",
+                options.abort, options.rise
+            ),
+        ));
+    }
     Ok((start, edges, options))
 }
 

@@ -1,19 +1,21 @@
 //! The real clock.
 
 use crate::base::{Clock, Time};
-use std::time::{Duration, Instant};
+use rustix::time::{ClockId, clock_gettime};
+use std::time::Duration;
 
-/// The monotonic clock of the system, zero when it was made.
+/// The system's clock that never jumps back and goes on while the machine is suspended, zero when it
+/// was made. Servos do not sleep when the host does: their watchdogs must be seen to have run out.
 #[derive(Clone, Debug)]
 pub struct RealClock {
-    start: Instant,
+    start: Duration,
 }
 
 impl RealClock {
     /// A clock that starts now.
     pub fn new() -> Self {
         Self {
-            start: Instant::now(),
+            start: since_boot(),
         }
     }
 }
@@ -26,7 +28,7 @@ impl Default for RealClock {
 
 impl Clock for RealClock {
     fn now(&self) -> Time {
-        Time::ZERO + self.start.elapsed()
+        Time::ZERO + since_boot().saturating_sub(self.start)
     }
 
     fn sleep_until(&self, time: Time) {
@@ -35,4 +37,10 @@ impl Clock for RealClock {
             std::thread::sleep(wait);
         }
     }
+}
+
+fn since_boot() -> Duration {
+    let now = clock_gettime(ClockId::Boottime);
+    let secs = u64::try_from(now.tv_sec).unwrap_or(0);
+    Duration::new(secs, u32::try_from(now.tv_nsec).unwrap_or(0))
 }

@@ -20,6 +20,8 @@ pub struct ControlOptions {
     pub duration_s: Option<f64>,
     /// Torque is switched off at the end of an orderly run.
     pub torque_off_at_end: bool,
+    /// A servo that latches a hardware error or loses its torque ends the run: settle, lie down, torque off.
+    pub stop_on_servo_fault: bool,
 }
 
 /// How a run ended.
@@ -42,8 +44,8 @@ pub struct Outcome {
     pub ending: Ending,
     /// What it measured.
     pub stats: Stats,
-    /// Torque read back at the end; `None` when the bus was already lost, or torque stays on.
-    pub torque: Option<TorqueReport>,
+    /// Torque read back at the end; `None` when torque stays on as declared.
+    pub torque: Option<Result<TorqueReport, BusError>>,
 }
 
 /// The parts a control loop works with.
@@ -64,8 +66,9 @@ pub struct Parts<'a> {
     pub on_start: &'a mut dyn FnMut(Time),
 }
 
-/// After this many cycles missed in a row time is not caught up but stopped: the host was suspended.
-const CATCH_UP_AT_MOST: i64 = 50;
+/// Time missed beyond this is not caught up: motion goes on from where it stood. More in one goal would
+/// be a jump for the servo.
+const CATCH_UP_AT_MOST_S: f64 = 0.02;
 /// Time in the end pose before torque goes off, so that lagging servos arrive, seconds.
 const REST_AT_END_S: f64 = 0.3;
 /// Most samples handed to one cycle.
@@ -87,7 +90,7 @@ pub fn run(mut parts: Parts<'_>, options: &ControlOptions) -> Outcome {
     let torque = if keep_torque {
         None
     } else {
-        parts.bus.torque_off().ok()
+        Some(parts.bus.torque_off())
     };
     Outcome {
         ending,
@@ -107,9 +110,11 @@ fn cycles(
     if parts.stop.request() != StopRequest::None {
         return Ok(Ending::Interrupted);
     }
-    let present: Vec<f64> = states.iter().map(|s| s.position).collect();
     parts.bus.arm()?;
-    parts.puppet.begin(Time::ZERO, &present);
+    // Not what was read before: a limp joint may have moved until its torque came on.
+    let mut armed_at: Vec<f64> = states.iter().map(|s| s.position).collect();
+    parts.bus.goals(&mut armed_at);
+    parts.puppet.begin(Time::ZERO, &armed_at);
 
     let dt_s = 1.0 / options.rate_hz;
     let mut samples: Vec<PoseSample> = Vec::with_capacity(SAMPLES_PER_CYCLE);
@@ -117,7 +122,7 @@ fn cycles(
     (parts.on_start)(start);
     let mut input_begun = false;
     let mut rest_cycles = (REST_AT_END_S * options.rate_hz) as u64;
-    let mut lost_for_good = false;
+    let mut reason: Option<String> = None;
     let mut cycle: i64 = 0;
     loop {
         let deadline = start + Duration::from_secs_f64(cycle as f64 * dt_s);
@@ -126,7 +131,7 @@ fn cycles(
         stats.lateness.add((late_s * 1e6) as u64);
         let mut behind = (late_s / dt_s) as i64;
         stats.overruns += behind as u64;
-        if behind > CATCH_UP_AT_MOST {
+        if behind as f64 * dt_s > CATCH_UP_AT_MOST_S {
             start = start + Duration::from_secs_f64(behind as f64 * dt_s);
             behind = 0;
         }
@@ -142,7 +147,8 @@ fn cycles(
             if request == StopRequest::AtOnce {
                 return Ok(Ending::Interrupted);
             }
-            let finish = request == StopRequest::Orderly
+            let finish = reason.is_some()
+                || request == StopRequest::Orderly
                 || parts.feed.ended()
                 || options.duration_s.is_some_and(|d| t_s >= d);
             let inputs = Inputs {
@@ -157,7 +163,13 @@ fn cycles(
             stats.cycles += 1;
             stats.held_back += u64::from(targets.held_back > 0);
             stats.poses_lost += u64::from(targets.poses_lost);
-            lost_for_good |= targets.poses_lost && targets.stage == Stage::Settling;
+            if reason.is_none() && !finish && targets.stage == Stage::Settling {
+                // Nobody asked for the end, so the puppet gave up by itself.
+                reason = Some(
+                    "no poses came for longer than safety.lost_s, and safety.on_lost is \"stop\""
+                        .into(),
+                );
+            }
             parts.feed.give_back(&mut samples);
             let report = if last {
                 send(parts, &mut states, newest_sample_s, start, stats)?
@@ -166,6 +178,10 @@ fn cycles(
             };
             if last {
                 stats.bus(t_s, &report);
+                let fallen = report.alert_mask | report.torqueless_mask;
+                if options.stop_on_servo_fault && fallen != 0 && reason.is_none() {
+                    reason = Some(fallen_servos(parts.bus.joints(), &report));
+                }
                 let next = deadline + Duration::from_secs_f64((behind + 1) as f64 * dt_s);
                 stats.missed += u64::from(parts.clock.now() > next);
             }
@@ -192,15 +208,38 @@ fn cycles(
         }
         cycle += behind + 1;
     }
-    Ok(if lost_for_good {
-        Ending::SafetyStop(
-            "no poses came for longer than safety.lost_s, and safety.on_lost is \"stop\"".into(),
-        )
+    Ok(if let Some(reason) = reason {
+        Ending::SafetyStop(reason)
     } else if parts.stop.request() == StopRequest::None {
         Ending::Complete
     } else {
         Ending::Interrupted
     })
+}
+
+/// Names the joints whose servos latched an error or came back without torque.
+fn fallen_servos(joints: &[String], report: &CycleReport) -> String {
+    let named = |mask: u64| -> Vec<&str> {
+        let hit = |i: usize| i < 64 && mask >> i & 1 == 1;
+        (0..joints.len())
+            .filter(|i| hit(*i))
+            .map(|i| joints[i].as_str())
+            .collect()
+    };
+    let mut parts = Vec::new();
+    for (mask, what) in [
+        (report.alert_mask, "hardware error latched"),
+        (report.torqueless_mask, "came back without torque"),
+    ] {
+        if mask != 0 {
+            parts.push(format!("{what}: {}", named(mask).join(", ")));
+        }
+    }
+    format!(
+        "{}. Look at it with `handwave bus read BUS ID all`, mend the cause, `handwave bus reboot BUS ID` \
+         (safety.on_servo_fault = \"continue\" plays on without it)",
+        parts.join("; ")
+    )
 }
 
 /// One exchange with the bus; counts the way from the newest sample to the wire.

@@ -7,14 +7,15 @@ use super::record::{CycleRecord, Inline, record_queue};
 use super::stats::Stats;
 use super::stop::StopSwitch;
 use crate::base::{Clock, Time, VirtualClock};
-use crate::bus::{ServoBus, TorqueReport};
-use crate::config::file::{OnExit, OnLost};
+use crate::bus::{BusError, ServoBus, TorqueReport};
+use crate::config::file::{OnExit, OnLost, OnServoFault};
 use crate::config::{Character, ConfigError};
 use crate::gesture::{FrontEnd, FrontEndError};
 use crate::motion::graph::TransitionCounts;
 use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader};
 use crate::puppet::{LostPolicy, Puppet, PuppetOptions};
 use std::io::BufRead;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -25,8 +26,8 @@ pub struct Report {
     pub ending: Ending,
     /// What the loop measured.
     pub stats: Stats,
-    /// Torque read back at the end.
-    pub torque: Option<TorqueReport>,
+    /// Torque read back at the end; `None` when it stays on as declared.
+    pub torque: Option<Result<TorqueReport, BusError>>,
     /// Transitions of the motion graph.
     pub transitions: TransitionCounts,
     /// Pose samples dropped, by reason.
@@ -103,6 +104,7 @@ pub fn control_options(
         rate_hz,
         duration_s,
         torque_off_at_end: character.safety.on_exit == OnExit::TorqueOff,
+        stop_on_servo_fault: character.safety.on_servo_fault == OnServoFault::Stop,
     }
 }
 
@@ -178,6 +180,7 @@ pub fn run_real<R: BufRead + Send + 'static>(
     let (mut recorder, mut records) = record_queue(&session.puppet, RECORDS);
     let (mut puppet, mut bus, mut on_start) = (session.puppet, session.bus, session.on_start);
     let (stop, options) = (session.stop, session.options);
+    let emergency = stop.clone();
     let control = std::thread::Builder::new()
         .name("control".into())
         .spawn(move || {
@@ -197,10 +200,19 @@ pub fn run_real<R: BufRead + Send + 'static>(
             (outcome, puppet, bus, recorder.lost(), real_time)
         })?;
     let period = Duration::from_secs_f64(1.0 / tick_hz);
-    while !control.is_finished() {
-        std::thread::sleep(period);
-        records.drain(|record| observer.cycle(record));
-        observer.tick();
+    let watched = catch_unwind(AssertUnwindSafe(|| {
+        while !control.is_finished() {
+            std::thread::sleep(period);
+            records.drain(|record| observer.cycle(record));
+            observer.tick();
+        }
+    }));
+    if let Err(panic) = watched {
+        // Whoever looks on failed: torque off first, then the panic goes its way.
+        emergency.press();
+        emergency.press();
+        let _ = control.join();
+        resume_unwind(panic);
     }
     let finished = control.join();
     records.drain(|record| observer.cycle(record));
@@ -210,7 +222,12 @@ pub fn run_real<R: BufRead + Send + 'static>(
             "the control thread ended abnormally; the servos' own watchdog stops them",
         )));
     };
-    let read = reading.join().unwrap_or_default();
+    // A source that blocks (a pipe nobody writes to) must not hold up the end; its thread dies with us.
+    let read = if reading.is_finished() {
+        reading.join().unwrap_or_default()
+    } else {
+        Default::default()
+    };
     Ok(report(
         outcome,
         &puppet,

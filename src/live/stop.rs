@@ -26,12 +26,13 @@ impl StopSwitch {
         Self::default()
     }
 
-    /// Presses the switch at each SIGINT and SIGTERM.
+    /// Presses the switch at each SIGINT, SIGTERM and SIGHUP (the terminal was closed), twice at SIGQUIT.
     pub fn on_signals(&self) -> std::io::Result<()> {
-        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+        for (signal, count) in [(SIGINT, 1), (SIGTERM, 1), (SIGHUP, 1), (SIGQUIT, 2)] {
             let presses = Arc::clone(&self.presses);
             let add = move || {
-                presses.fetch_add(1, Ordering::SeqCst);
+                presses.fetch_add(count, Ordering::SeqCst);
             };
             // SAFETY: the handler only adds to an atomic, which is allowed in a signal handler.
             #[allow(unsafe_code)]

@@ -4,6 +4,7 @@
 //! the gesture's; every limb keeps its own timeline (eq. 9.7). A path class is driven by progression.
 
 use super::clip::{Clip, ClipKind, RootAdvance};
+use super::limbs::timelines;
 use super::range::{JointRange, Steepness};
 use super::smooth::Follower;
 use super::weights::{Parameters, Weights, WeightsError};
@@ -331,7 +332,7 @@ impl MotionClass {
 
         let goal_rate = if state.locked {
             // Second-order lock: feed-forward of the gesture's frequency, correction of the phase.
-            let lag = wrap_pi(drive.phase_rad - state.phase);
+            let lag = wrap_pi(drive.phase_rad - (state.phase + rate * dt_s));
             let bound = CATCH_UP * rate;
             let correction = if wanted > 0.0 && lag.is_finite() {
                 (self.lock_rate * lag).clamp(-bound, bound)
@@ -423,16 +424,19 @@ impl MotionClass {
         let bound = LIMB_ADVANCE * advance.abs();
         for limb in 0..self.state.limb_shift.len() {
             let mut moving = 0.0;
-            let mut sum = 0.0;
+            // The mean of angles is that of their unit vectors (eq. 9.7 is circular).
+            let (mut sin, mut cos) = (0.0, 0.0);
             for (offsets, weight) in self.offsets.iter().zip(&self.weights) {
                 if let Some(offsets) = offsets {
                     moving += weight;
-                    sum += weight * offsets[limb];
+                    sin += weight * offsets[limb].sin();
+                    cos += weight * offsets[limb].cos();
                 }
             }
-            if moving > 1e-9 {
+            // Opposite offsets cancel out: then the limb stays with the timeline it has.
+            if moving > 1e-9 && sin.hypot(cos) > 0.05 * moving {
                 let shift = &mut self.state.limb_shift[limb];
-                let gap = wrap_pi(sum / moving - *shift);
+                let gap = wrap_pi(sin.atan2(cos) - *shift);
                 *shift += if at_rest {
                     gap
                 } else {
@@ -469,51 +473,4 @@ impl MotionClass {
 fn awake(amplitude: f64) -> f64 {
     let u = (amplitude - REST_AMPLITUDE) / (FULL_FROM_AMPLITUDE - REST_AMPLITUDE);
     amplitude.max(0.0) * super::smooth::ease(u)
-}
-
-/// Limb of each joint, and per clip the offset of every limb's timeline against the reference.
-///
-/// The reference is the slowest moving clip (the longest); offsets are brought into half a turn of it.
-type Timelines = (Vec<Option<usize>>, Vec<Option<Vec<f64>>>);
-
-fn timelines(class: &str, clips: &[&Clip], joints: usize) -> Result<Timelines, ClassError> {
-    let moves = |clip: &Clip| !clip.limbs.is_empty() && clip.limbs.iter().any(|l| l.duty < 1.0);
-    let reference = clips
-        .iter()
-        .filter(|c| moves(c))
-        .min_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    let mut limb_of = vec![None; joints];
-    let Some(reference) = reference else {
-        return Ok((limb_of, vec![None; clips.len()]));
-    };
-    for (i, limb) in reference.limbs.iter().enumerate() {
-        for joint in &limb.joints {
-            limb_of[*joint] = Some(i);
-        }
-    }
-    let offsets = clips
-        .iter()
-        .map(|clip| {
-            if !moves(clip) {
-                return Ok(None);
-            }
-            reference
-                .limbs
-                .iter()
-                .map(|wanted| {
-                    clip.limbs
-                        .iter()
-                        .find(|l| l.name == wanted.name)
-                        .map(|l| wrap_pi(TAU * (wanted.phase - l.phase)))
-                        .ok_or_else(|| ClassError::Limbs {
-                            class: class.into(),
-                            clip: clip.name.clone(),
-                            segment: wanted.name.clone(),
-                        })
-                })
-                .collect::<Result<Vec<f64>, _>>()
-                .map(Some)
-        })
-        .collect::<Result<_, _>>()?;
-    Ok((limb_of, offsets))
 }

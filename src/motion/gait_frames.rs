@@ -223,7 +223,8 @@ fn cycle_clip(
         .collect();
     let mut positions = vec![0.0; file.joints.len()];
     for (i, leg) in legs.iter().enumerate() {
-        leg.place_foot_from_scratch(model, foot_at(i, 0.0), &mut positions)
+        // The knee's side is chosen where the foot stands, so that every clip of the robot agrees.
+        leg.place_foot_from_scratch(model, stance.neutral[i], &mut positions)
             .map_err(|e| stance.cannot(&description.name, e))?;
     }
     for k in 0..CYCLE_FRAMES {
@@ -285,7 +286,7 @@ fn path_clip(
             let ground = Point3::new(neutral.x, neutral.y, 0.0);
             let foot = body.inverse_transform_point(&ground);
             if k == 0 {
-                leg.place_foot_from_scratch(model, foot, &mut positions)
+                leg.place_foot_from_scratch(model, *neutral, &mut positions)
                     .map_err(|e| stance.cannot(&description.name, e))?;
             }
             leg.place_foot(model, foot, &mut positions)

@@ -11,6 +11,7 @@ pub mod gait;
 pub mod gait_frames;
 pub mod graph;
 pub mod layer;
+mod limbs;
 pub mod range;
 mod smooth;
 mod spline;

@@ -79,7 +79,7 @@ impl Weights {
             .map(|p| [0, 1].map(|d| (p[d] - low[d]) / span[d]))
             .collect();
         let n = centres.len();
-        let mut radii = vec![1.0; n];
+        let mut radii = vec![if n == 1 { 1.0 } else { f64::INFINITY }; n];
         for i in 0..n {
             for j in 0..n {
                 if i != j {
@@ -93,14 +93,7 @@ impl Weights {
                         });
                     }
                     // Twice the nearest neighbour: neighbours overlap, distant clips stay out.
-                    radii[i] = f64::min(
-                        if radii[i] == 1.0 {
-                            f64::INFINITY
-                        } else {
-                            radii[i]
-                        },
-                        2.0 * distance,
-                    );
+                    radii[i] = radii[i].min(2.0 * distance);
                 }
             }
         }

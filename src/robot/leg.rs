@@ -69,6 +69,9 @@ pub enum LegError {
     },
 }
 
+/// Solutions whose costs differ by less are alike: then the knee's side decides.
+const KNEE_TIE: f64 = 1e-2;
+
 impl Leg {
     /// The leg that ends in link `foot`.
     pub fn to_foot(model: &RobotModel, name: &str, foot: &str) -> Result<Self, LegError> {
@@ -244,8 +247,9 @@ impl Leg {
         })
     }
 
-    /// Solves the foot from several starting poses and keeps the solution nearest the middle of
-    /// the joint ranges: for the first pose of a motion, where no neighbour tells the knee's side.
+    /// Solves the foot from several starting poses, for the first pose of a motion, where no neighbour
+    /// tells the knee's side. Keeps the solution nearest the middle of the ranges; where both sides are
+    /// alike, the knee points backwards, so that all legs and all clips of a robot agree.
     pub fn place_foot_from_scratch(
         &self,
         model: &RobotModel,
@@ -272,11 +276,17 @@ impl Leg {
                 match self.place_foot(model, goal, positions) {
                     Ok(()) => {
                         let solved = self.joints.map(|j| positions[j]);
-                        let cost: f64 = (0..3)
+                        let side = if self.knee_points_back(model, positions) {
+                            0.0
+                        } else {
+                            KNEE_TIE
+                        };
+                        let spread: f64 = (0..3)
                             .map(|i| {
                                 ((solved[i] - middle[i]) / (limits[i].1 - limits[i].0)).powi(2)
                             })
                             .sum();
+                        let cost = spread + side;
                         if best.is_none_or(|(c, _)| cost < c - 1e-9) {
                             best = Some((cost, solved));
                         }
@@ -295,6 +305,19 @@ impl Leg {
             (None, Some(e)) => Err(e),
             (None, None) => Ok(()),
         }
+    }
+
+    /// Whether the knee lies behind the straight line from hip to foot (x is forward).
+    fn knee_points_back(&self, model: &RobotModel, positions: &[f64]) -> bool {
+        let at = |i: usize| {
+            let joint = &model.joints[model.actuated[self.joints[i]]];
+            model.link_pose(joint.child, positions).translation.vector
+        };
+        let (hip, knee) = (at(1), at(2));
+        let foot = self.foot_position(model, positions).coords;
+        let line = foot - hip;
+        let along = ((knee - hip).dot(&line) / line.norm_squared().max(1e-12)).clamp(0.0, 1.0);
+        knee.x <= (hip + line * along).x + 1e-9
     }
 
     /// Columns: velocity of the foot per unit speed of each joint, in the root link's frame.

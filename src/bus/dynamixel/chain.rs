@@ -305,6 +305,12 @@ impl ServoBus for DynamixelChain {
         armed
     }
 
+    fn goals(&self, out_rad: &mut [f64]) {
+        for (servo, out) in self.servos.iter().zip(out_rad) {
+            *out = servo.spec.position_rad(servo.goal_pulse.round() as i32);
+        }
+    }
+
     fn exchange(
         &mut self,
         targets_rad: &[f64],
