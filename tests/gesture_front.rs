@@ -158,6 +158,61 @@ fn dropouts_and_holes_do_not_stop_the_wave() {
     assert!(turn < 0.1, "phase off by {turn:.3} rad");
 }
 
+/// What a gesture reads when it is shown until 6 s, then nothing for `gap` seconds, then `after`
+/// (of the time since the gap): time since the gap and amplitude.
+fn after_gap(way: Way, gap: f64, after: impl Fn(f64) -> (f64, f64)) -> Vec<(f64, f64)> {
+    let mut front = front(&wave_set(way));
+    let mut read = Vec::new();
+    for t in times(60.0, 6.0, 0.3, 5) {
+        (front.push(&sample(t, &pose(way, 1.0, TAU * t)))).expect("good sample");
+    }
+    assert!(front.estimates()[0].amplitude > 0.9);
+    for u in times(60.0, 6.0, 0.3, 6) {
+        let (size, phase) = after(u);
+        (front.push(&sample(6.0 + gap + u, &pose(way, size, phase)))).expect("good sample");
+        read.push((u, front.estimates()[0].amplitude));
+    }
+    read
+}
+
+#[test]
+fn a_pose_held_after_a_gap_is_no_gesture() {
+    for way in [Way::Loop, Way::Line] {
+        for gap in [0.6, 1.0, 2.0, 7.0] {
+            let mut most = 0.0_f64;
+            for k in 0..4 {
+                let phase = TAU * (f64::from(k) + 0.1) / 4.0;
+                let read = after_gap(way, gap, |_| (1.0, phase));
+                most = read.iter().fold(most, |most, (_, a)| most.max(*a));
+            }
+            println!("{way:?}, {gap} s gap, then held: amplitude at most {most:.3}");
+            assert!(most < 0.1, "{way:?}, gap {gap} s: amplitude {most:.3}");
+        }
+    }
+}
+
+#[test]
+fn a_gesture_after_a_gap_is_found_as_soon_as_at_the_start() {
+    let onset = |read: &[(f64, f64)]| {
+        let found = read.iter().find(|(_, amplitude)| *amplitude > 0.8);
+        found.map_or(f64::INFINITY, |(u, _)| *u)
+    };
+    for way in [Way::Loop, Way::Line] {
+        let mut first = front(&wave_set(way));
+        let mut read = Vec::new();
+        for u in times(60.0, 6.0, 0.3, 6) {
+            (first.push(&sample(u, &pose(way, 1.0, TAU * u)))).expect("good sample");
+            read.push((u, first.estimates()[0].amplitude));
+        }
+        let usual = onset(&read);
+        for gap in [0.6, 1.0, 2.0, 7.0] {
+            let again = onset(&after_gap(way, gap, |u| (1.0, TAU * u)));
+            println!("{way:?}: above 0.8 after {usual:.2} s, after a {gap} s gap {again:.2} s");
+            assert!(again <= usual + 0.05, "{way:?}, gap {gap} s: {again:.2} s");
+        }
+    }
+}
+
 /// Right hand circles, left hand nods; both may move at once.
 fn two(right: f64, left: f64, t: f64) -> Vec<[f64; 3]> {
     let mut places = pose(Way::Loop, right, TAU * t);
@@ -227,6 +282,39 @@ fn a_raised_arm_gives_a_progression() {
             (estimate.amplitude - expected).abs() < 0.06,
             "{estimate:?} for {expected}"
         );
+    }
+}
+
+#[test]
+fn a_progression_after_a_gap_lies_between_old_and_new() {
+    let mut set = GestureSet::new(&header(), Vec::new());
+    let shown = recording(2.0, |t| pose(Way::Line, 1.0, 0.5 * TAU * (1.0 + t)));
+    let marks = NonCyclicMarks {
+        rest_s: 0.0,
+        extreme_s: 1.0,
+    };
+    let found = define_non_cyclic(&set, &shown, "raise", "test", marks).expect("the arm moves");
+    set.put(found.gesture);
+    for smoothing in [0.0, 0.05, 2.0] {
+        set.options.progression_smoothing_s = smoothing;
+        for gap in [0.1, 0.3, 0.6, 2.0, 7.0] {
+            let mut front = front(&set);
+            let mut show = |t: f64, phase: f64| {
+                (front.push(&sample(t, &pose(Way::Line, 1.0, TAU * phase)))).expect("good sample");
+                front.estimates()[0].amplitude
+            };
+            let old = (0..60).fold(0.0, |_, k| show(f64::from(k) / 60.0, 0.5));
+            let mut last = old;
+            for k in 0..600 {
+                let now = show(1.0 + gap + f64::from(k) / 60.0, 0.75);
+                assert!(
+                    now >= last - 1e-9 && now < 0.56,
+                    "gap {gap} s, smoothing {smoothing} s: {last:.3} to {now:.3}"
+                );
+                last = now;
+            }
+            assert!((last - 0.5).abs() < 0.06, "ends at {last:.3}");
+        }
     }
 }
 

@@ -102,7 +102,7 @@ fn every_bad_sample_is_dropped_for_its_own_reason() {
     let counts = reader.counts();
     assert_eq!(
         counts.by_reason().map(|(_, count)| count),
-        [1, 2, 1, 2, 2, 0],
+        [1, 2, 1, 2, 2, 0, 0],
         "{counts}"
     );
 }
@@ -135,6 +135,27 @@ fn ten_bad_samples_in_a_row_name_the_first() {
             .starts_with("in.jsonl:3: time runs backwards"),
         "{error}"
     );
+}
+
+#[test]
+fn stamps_in_milliseconds_are_refused_with_the_step_and_the_unit() {
+    for (step, said) in [(9.25, "by 9.25 s"), (9250.0, "by 9250 s")] {
+        let mut text = String::from("t,a.x,a.y\n");
+        for k in 0..20 {
+            text.push_str(&format!("{},0,0\n", step * f64::from(k)));
+        }
+        let error = csv(&text)
+            .expect("good header")
+            .collect::<Result<Vec<_>, _>>()
+            .expect_err("no tracker is that slow")
+            .to_string();
+        assert!(
+            error.starts_with("in.csv:3: time jumps ")
+                && error.contains(said)
+                && error.contains("t is in seconds"),
+            "{error}"
+        );
+    }
 }
 
 #[test]
@@ -232,6 +253,29 @@ proptest! {
                 reader.for_each(drop);
             }
         }
+    }
+
+    #[test]
+    fn one_wild_stamp_loses_at_most_two_samples(
+        steps in proptest::collection::vec(0.001..0.1f64, 30..80),
+        place in 1..30usize,
+        wild in prop_oneof![
+            any::<f64>().prop_filter("written as a number", |t| t.is_finite()),
+            Just(1e9), Just(1e300), -1e3..0.0f64, 50.0..1e7f64,
+        ],
+    ) {
+        let mut text = String::from("t,a.x,a.y\n");
+        let mut time = 0.0;
+        for (k, step) in steps.iter().enumerate() {
+            time += step;
+            // What lies just ahead cannot be told from a pause; what lies far off is told.
+            let wrong = k == place && (wild <= time || wild > time + 30.0);
+            text.push_str(&format!("{},0,0\n", if wrong { wild } else { time }));
+        }
+        let mut reader = csv(&text).expect("good header");
+        let samples = (&mut reader).collect::<Result<Vec<_>, _>>().expect("goes on");
+        prop_assert!(samples.len() + 2 >= steps.len(), "{} of {}", samples.len(), steps.len());
+        prop_assert_eq!(samples.len() as u64 + reader.counts().total(), steps.len() as u64);
     }
 
     #[test]

@@ -2,6 +2,12 @@
 
 use super::{GaborEstimator, GestureOptions};
 
+/// After a gap in the samples longer than this, in seconds, an estimator begins anew.
+///
+/// Whatever moved before the gap says nothing about what is held or performed after it. Shorter
+/// gaps are bridged: the wave runs on in phase.
+pub const LONGEST_GAP_S: f64 = 0.5;
+
 /// One pose on a gesture's plane.
 #[derive(Copy, Clone, Debug, Default, PartialEq)]
 pub struct PlanePoint {
@@ -30,7 +36,7 @@ pub struct WaveEstimate {
 /// `push` and `estimate` allocate nothing. Times are seconds and strictly increase; the caller has
 /// checked that all numbers are finite.
 pub trait Estimator: Send {
-    /// Takes the next point.
+    /// Takes the next point; more than [`LONGEST_GAP_S`] after the last one it is a first point.
     fn push(&mut self, t: f64, point: PlanePoint);
     /// The estimate at the time of the last point; all zero before the first.
     fn estimate(&self) -> WaveEstimate;

@@ -7,6 +7,8 @@
 //!   dropped samples do not count twice or leave dents.
 //! - Just after the start the window is not full; the response then counts only for the square of
 //!   the covered share, which makes amplitude grow from zero and keeps slow filters from guessing.
+//! - A gap of more than half a second ([`LONGEST_GAP_S`]) is such a start too: filters that reach
+//!   back no farther than its end would take a held pose for a slow wave.
 //! - The 50 periods are spaced logarithmically; the peak is refined by a parabola over the
 //!   logarithm of frequency and the filter is evaluated once more there.
 //! - Both senses of rotation are searched; the other sense must win by 10 %, because a gesture that
@@ -19,6 +21,7 @@
 //! Cost: slow filters read averages of neighbouring samples (blocks of at most 1/40 period), so a
 //! filter takes some 80 to 160 samples whatever the rate.
 
+use super::estimator::LONGEST_GAP_S;
 use super::kernel::Kernel;
 use super::smooth::Smoother;
 use super::window::Window;
@@ -104,7 +107,7 @@ pub struct GaborEstimator {
     frequencies_hz: [f64; FILTERS],
     under_constrained: bool,
     history: Window<Sample>,
-    /// Time of the first sample since the last reset.
+    /// Time of the first sample since the last reset or long gap.
     since: f64,
     levels: Vec<Vec<Block>>,
     smoother: Smoother,
@@ -329,8 +332,12 @@ fn mean_modulus(wr: f64, wi: f64) -> f64 {
 
 impl Estimator for GaborEstimator {
     fn push(&mut self, t: f64, point: PlanePoint) {
-        if self.history.values().is_empty() {
-            self.since = t;
+        match self.history.values().last() {
+            Some(last) if t - last.t <= LONGEST_GAP_S => {}
+            _ => {
+                self.reset();
+                self.since = t;
+            }
         }
         self.history.push(Sample {
             t,

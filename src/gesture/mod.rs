@@ -20,7 +20,7 @@ mod window;
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };
-pub use estimator::{Estimator, EstimatorKind, PlanePoint, WaveEstimate};
+pub use estimator::{Estimator, EstimatorKind, LONGEST_GAP_S, PlanePoint, WaveEstimate};
 pub use file::{GestureFileError, VERSION};
 pub use front::{FrontEnd, FrontEndError, FrontEndOptions, GestureEstimate};
 pub use gabor::GaborEstimator;

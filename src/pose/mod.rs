@@ -22,6 +22,7 @@ pub use reader::{PoseFormat, PoseReader};
 pub use recording::Recording;
 pub use sample::{PoseHeader, PoseSample};
 pub use validate::{
-    BadSample, FaultCounts, MAX_BAD_IN_A_ROW, MAX_LINE_BYTES, SampleFault, Validator,
+    BadSample, FaultCounts, LONGEST_JUMP_S, LONGEST_STEP_S, MAX_BAD_IN_A_ROW, MAX_LINE_BYTES,
+    SampleFault, Validator,
 };
 pub use write::PoseWriter;

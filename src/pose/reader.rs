@@ -35,7 +35,7 @@ impl PoseFormat {
 /// Reads a pose stream: the header at once, then one good sample per call.
 ///
 /// Bad samples are dropped and counted ([`PoseReader::counts`]); ten in a row are an error that
-/// names the first. As an iterator it ends after the first error.
+/// names the first, and so are stamps that are plainly not in seconds ([`Validator`]). As an iterator it ends after the first error.
 #[derive(Debug)]
 pub struct PoseReader<R> {
     input: R,
