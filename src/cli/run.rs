@@ -209,11 +209,12 @@ fn session(
     options: &RunOptions,
     character: &Character,
     rate_hz: f64,
-    reader: SourceReader,
+    mut reader: SourceReader,
     faults: Vec<FaultSpec>,
     clock: Arc<dyn Clock>,
     stop: StopSwitch,
 ) -> Result<Session<Box<dyn BufRead + Send>>, Failure> {
+    let first = source::first_sample(&mut reader).map_err(Failure::input)?;
     let puppet = session::puppet(character, reader.header(), rate_hz).map_err(Failure::input)?;
     let wire = wire::open(character, &character.bus, clock, rate_hz).map_err(|e| match e {
         WireError::Port(_) => Failure::bus(e),
@@ -224,6 +225,7 @@ fn session(
         puppet,
         bus: wire.bus,
         reader,
+        first,
         stop,
         options: session::control_options(character, rate_hz, options.duration),
         on_start: Box::new(move |start| {

@@ -52,12 +52,12 @@ pub struct ReaderFeed<R> {
 }
 
 impl<R: BufRead> ReaderFeed<R> {
-    /// A feed of `reader`.
-    pub fn new(reader: PoseReader<R>) -> Self {
+    /// A feed of `first`, then of what is left in `reader`.
+    pub fn new(reader: PoseReader<R>, first: PoseSample) -> Self {
         Self {
             reader,
             schedule: Schedule::default(),
-            next: None,
+            next: Some(first),
             spare: Vec::new(),
             over: false,
             error: None,
@@ -136,9 +136,10 @@ pub type ReaderThread = JoinHandle<(FaultCounts, Option<PoseError>)>;
 /// Samples read ahead.
 const AHEAD: usize = 512;
 
-/// Reads `reader` ahead in a thread of its own.
+/// Gives `first`, then what is left in `reader`, which a thread of its own reads ahead.
 pub fn read_ahead<R: BufRead + Send + 'static>(
     mut reader: PoseReader<R>,
+    first: PoseSample,
 ) -> std::io::Result<(QueueFeed, ReaderThread)> {
     let (mut items_in, items_out) = RingBuffer::new(AHEAD);
     let (used_in, mut used_out) = RingBuffer::<PoseSample>::new(AHEAD);
@@ -177,7 +178,7 @@ pub fn read_ahead<R: BufRead + Send + 'static>(
             items: items_out,
             used: used_in,
             schedule: Schedule::default(),
-            next: None,
+            next: Some(first),
             over: false,
         },
         thread,

@@ -12,7 +12,7 @@ use crate::config::file::{OnExit, OnLost, OnServoFault};
 use crate::config::{Character, ConfigError};
 use crate::gesture::{FrontEnd, FrontEndError};
 use crate::motion::graph::TransitionCounts;
-use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader};
+use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader, PoseSample};
 use crate::puppet::{LostPolicy, Puppet, PuppetOptions};
 use std::io::BufRead;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -122,8 +122,10 @@ pub struct Session<R> {
     pub puppet: Puppet,
     /// The servos; on the same clock as the run.
     pub bus: Box<dyn ServoBus>,
-    /// The poses.
+    /// The poses, from the second sample on.
     pub reader: PoseReader<R>,
+    /// The first sample: a stream without one is found out before anything moves.
+    pub first: PoseSample,
     /// Signals and keys.
     pub stop: StopSwitch,
     /// Rate, duration, what happens at the end.
@@ -140,7 +142,7 @@ pub fn run_virtual<R: BufRead>(
     clock: &VirtualClock,
     observer: &mut dyn Observer,
 ) -> Report {
-    let mut feed = ReaderFeed::new(session.reader);
+    let mut feed = ReaderFeed::new(session.reader, session.first);
     let mut recorder = Inline::new(&session.puppet, |record| observer.cycle(record));
     let outcome = control::run(
         Parts {
@@ -176,7 +178,7 @@ pub fn run_real<R: BufRead + Send + 'static>(
     observer: &mut dyn Observer,
     tick_hz: f64,
 ) -> Result<Report, SessionError> {
-    let (mut feed, reading) = read_ahead(session.reader)?;
+    let (mut feed, reading) = read_ahead(session.reader, session.first)?;
     let (mut recorder, mut records) = record_queue(&session.puppet, RECORDS);
     let (mut puppet, mut bus, mut on_start) = (session.puppet, session.bus, session.on_start);
     let (stop, options) = (session.stop, session.options);

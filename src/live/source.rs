@@ -1,7 +1,7 @@
 //! Pose sources by name: what `--input` and `input.source` say, opened for reading.
 
 use crate::config::Files;
-use crate::pose::{PoseError, PoseFormat, PoseReader};
+use crate::pose::{PoseError, PoseFormat, PoseReader, PoseSample};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor};
 use std::path::{Path, PathBuf};
@@ -31,6 +31,9 @@ pub enum SourceError {
     /// A built-in file that is not there.
     #[error("{0}")]
     Config(#[from] crate::config::ConfigError),
+    /// Nothing in it.
+    #[error("no good sample in the pose stream; nothing to play")]
+    Empty,
     /// The stream cannot be read.
     #[error("{0}")]
     Pose(#[from] PoseError),
@@ -75,6 +78,16 @@ fn open_file(path: &Path) -> Result<SourceReader, SourceError> {
     })?;
     let input: Box<dyn BufRead + Send> = Box::new(BufReader::new(file));
     Ok(PoseReader::new(input, format, &name)?)
+}
+
+/// Reads the first good sample, so that a stream without one is found out before anything moves.
+pub fn first_sample(reader: &mut SourceReader) -> Result<PoseSample, SourceError> {
+    let mut sample = PoseSample::default();
+    if reader.read_into(&mut sample)? {
+        Ok(sample)
+    } else {
+        Err(SourceError::Empty)
+    }
 }
 
 /// The place that a path on the command line is relative to.

@@ -81,10 +81,14 @@ impl Running {
     }
 
     pub fn interrupt(&self) {
+        self.signal(libc::SIGINT);
+    }
+
+    pub fn signal(&self, signal: i32) {
         let pid = i32::try_from(self.child.id()).expect("a process id");
         // SAFETY: sends a signal to a child of this process that was not waited for yet.
         #[allow(unsafe_code)]
-        let sent = unsafe { libc::kill(pid, libc::SIGINT) };
+        let sent = unsafe { libc::kill(pid, signal) };
         assert_eq!(sent, 0, "the signal was not sent");
     }
 
