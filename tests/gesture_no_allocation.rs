@@ -37,6 +37,8 @@ fn push_estimate_and_predict_allocate_nothing() {
     // 500 Hz overfills every window, so the wrap of the buffers is passed too.
     let samples: Vec<_> = times(500.0, 10.0, 0.3, 1)
         .into_iter()
+        // And a long gap, after which the estimators begin anew.
+        .map(|t| if t < 8.0 { t } else { t + 2.0 })
         .map(|t| sample(t, &pose(Path::Line, 1.0, 6.0 * t)))
         .collect();
     let before = ALLOCATIONS.load(Ordering::Relaxed);
