@@ -192,3 +192,16 @@ fn a_stream_without_a_good_sample_moves_nothing() {
     assert!(ended.err.contains("no good sample"), "{}", ended.err);
     assert_eq!(ended.out, "", "a run was begun");
 }
+
+#[test]
+fn a_wire_too_slow_for_the_rate_is_said_before_the_run() {
+    let ended = run_virtual(&["--rate", "400", "--duration", "1"]).expect(0);
+    // 12 servos at 1 Mbaud: 276 bytes of 10 us.
+    assert!(
+        ended.err.contains("need 2.8 ms") && ended.err.contains("at most 362 Hz"),
+        "{}",
+        ended.err
+    );
+    let fits = run_virtual(&["--duration", "1"]).expect(0);
+    assert_eq!(fits.err, "", "a warning at 200 Hz");
+}

@@ -2,7 +2,7 @@
 
 use super::summary;
 use super::targets::TargetsFile;
-use super::{ExitStatus, Failure, say};
+use super::{ExitStatus, Failure, say, warn};
 use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
 use crate::config::files::BUILT_IN;
@@ -142,6 +142,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
                 .map_err(|e| Failure::input(format!("--targets {}: {e}", path.display())))
         })
         .transpose()?;
+    if let Some(problem) = wire::too_slow(&character, &character.bus, rate_hz) {
+        warn(format_args!("warning: {problem}"));
+    }
     let stop = StopSwitch::new();
     stop.on_signals()
         .map_err(|e| Failure::input(format!("cannot listen for signals: {e}")))?;

@@ -1,6 +1,7 @@
 //! Opens the bus of a character: simulated servos in this process, or a serial port.
 
 use crate::base::{Clock, Time};
+use crate::bus::dynamixel::model::STATE_BYTES;
 use crate::bus::dynamixel::{
     self, ChainOptions, Client, DynamixelChain, Master, MasterOptions, SpecError,
 };
@@ -8,8 +9,12 @@ use crate::bus::{BusAddress, PortError, ServoBus};
 use crate::config::Character;
 use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
 use handwave_dynamixel::baud::RateList;
+use handwave_dynamixel::wire;
 use std::sync::Arc;
 use std::time::Duration;
+
+/// Bytes of a goal position.
+const GOAL_BYTES: usize = 4;
 
 /// An open bus, and the simulated line behind it if there is one.
 pub struct Wire {
@@ -95,6 +100,27 @@ fn simulated_line(character: &Character) -> Result<SharedLine, WireError> {
         },
     )?;
     Ok(SharedLine::new(line))
+}
+
+/// Says so when the wire cannot carry `rate_hz` cycles per second: `None` when it can.
+///
+/// The least a cycle takes is a sync write of goals and a fast sync read of states, byte times alone.
+pub fn too_slow(character: &Character, address: &BusAddress, rate_hz: f64) -> Option<String> {
+    let baud = match address {
+        BusAddress::Sim => character.sim_baud,
+        BusAddress::Dynamixel { baud, .. } => *baud,
+    };
+    let servos = character.servos.len();
+    let cycle = wire::duration(wire::fast_cycle(servos, GOAL_BYTES, STATE_BYTES), baud);
+    let period_s = 1.0 / rate_hz;
+    (cycle.as_secs_f64() > period_s).then(|| {
+        format!(
+            "{servos} servos at {baud} baud need {:.1} ms for a cycle, {rate_hz} Hz leave {:.1} ms: at most {:.0} Hz. Raise the baud rate or lower --rate (bus.rate_hz)",
+            cycle.as_secs_f64() * 1e3,
+            period_s * 1e3,
+            (1.0 / cycle.as_secs_f64()).floor()
+        )
+    })
 }
 
 /// Injects `faults`, whose times count from `start`. Their servos were checked when they were parsed.

@@ -77,6 +77,8 @@ fn gesture_lines(names: &Names, record: &CycleRecord) -> Vec<Line<'static>> {
             Color::DarkGray
         };
         let reading = match g.kind {
+            // The frequency of what is hardly there means nothing.
+            GestureKind::Cyclic if g.amplitude < 0.05 => format!(" a {:4.2}", g.amplitude),
             GestureKind::Cyclic => format!(
                 " a {:4.2}  f {:5.2} Hz  {} {:3.0}°  quality {:.2}",
                 g.amplitude,
