@@ -1,5 +1,5 @@
 //! How long the codec takes for one control cycle of twelve servos: goals out, fast answer in.
-#![allow(missing_docs)]
+#![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use handwave_dynamixel::fast::{self, Blocks};

@@ -1,5 +1,5 @@
 //! How long one step of the puppet takes while fingers drum, and what a whole cycle on the simulated line costs.
-#![allow(missing_docs)]
+#![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use handwave::base::{Clock, JointState, Time, VirtualClock};

@@ -111,8 +111,14 @@ fn commands_look_at_and_change_servos() {
     );
     let reboot = simulator.bus("reboot", &["2"]);
     assert_eq!(reboot.status.code(), Some(0), "{}", stderr(&reboot));
-    std::thread::sleep(Duration::from_millis(600));
-    let torque = simulator.bus("read", &["2", "torque_enable", "--json"]);
+    // It boots for a while; every unanswered question waits by itself.
+    let deadline = Instant::now() + Duration::from_secs(5);
+    let torque = loop {
+        let torque = simulator.bus("read", &["2", "torque_enable", "--json"]);
+        if torque.status.success() || Instant::now() > deadline {
+            break torque;
+        }
+    };
     assert!(
         stdout(&torque).contains("\"value\":0"),
         "{}",

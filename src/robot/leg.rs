@@ -226,9 +226,7 @@ impl Leg {
                 damping = (damping * 0.3).max(1e-9);
                 error = new_error;
             } else {
-                for (j, value) in self.joints.iter().zip(before) {
-                    positions[*j] = value;
-                }
+                self.put(before, positions);
                 damping *= 10.0;
                 if damping > 1e3 {
                     break;
@@ -270,9 +268,7 @@ impl Leg {
                     limits[1].0 + thigh * (limits[1].1 - limits[1].0),
                     limits[2].0 + knee * (limits[2].1 - limits[2].0),
                 ];
-                for (j, value) in self.joints.iter().zip(start) {
-                    positions[*j] = value;
-                }
+                self.put(start, positions);
                 match self.place_foot(model, goal, positions) {
                     Ok(()) => {
                         let solved = self.joints.map(|j| positions[j]);
@@ -297,13 +293,18 @@ impl Leg {
         }
         match (best, failure) {
             (Some((_, solved)), _) => {
-                for (j, value) in self.joints.iter().zip(solved) {
-                    positions[*j] = value;
-                }
+                self.put(solved, positions);
                 Ok(())
             }
             (None, Some(e)) => Err(e),
             (None, None) => Ok(()),
+        }
+    }
+
+    /// Sets the leg's three joints in `positions`.
+    fn put(&self, values: [f64; 3], positions: &mut [f64]) {
+        for (j, value) in self.joints.iter().zip(values) {
+            positions[*j] = value;
         }
     }
 

@@ -1,5 +1,4 @@
 //! The parser on a bad line: pieces, garbage, damage, gaps. It may lose frames, never invent one.
-#![allow(missing_docs)]
 
 use handwave_dynamixel::frame::MIN_LEN;
 use handwave_dynamixel::{

@@ -1,5 +1,4 @@
 //! The frames published in the vendor's manual, both ways: typed form to bytes, bytes to typed form.
-#![allow(missing_docs)]
 
 use handwave_dynamixel::fast::{self, BlockError, Blocks};
 use handwave_dynamixel::instruction::{
