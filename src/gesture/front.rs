@@ -1,6 +1,6 @@
 //! The front end: pose samples in, one estimate per gesture out, every sample, no allocation.
 
-use super::smooth::ProgressionSmoother;
+use super::wave::ProgressionSmoother;
 use super::{Estimator, EstimatorKind, GestureKind, GestureSet, Plane, References};
 use crate::base::angle::wrap_tau;
 use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault};

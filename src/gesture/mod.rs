@@ -5,26 +5,21 @@
 //! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
 
 mod define;
-mod estimator;
 mod file;
 mod front;
-mod gabor;
-mod kernel;
 mod period;
 mod plane;
 mod separability;
 mod set;
-mod smooth;
-mod window;
+mod wave;
 
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };
-pub use estimator::{Estimator, EstimatorKind, LONGEST_GAP_S, PlanePoint, WaveEstimate};
 pub use file::{GestureFileError, VERSION};
 pub use front::{FrontEnd, FrontEndError, FrontEndOptions, GestureEstimate};
-pub use gabor::GaborEstimator;
 pub use period::{PeriodEstimate, find_period};
 pub use plane::{Plane, References};
 pub use separability::{Response, responses};
 pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
+pub use wave::{Estimator, EstimatorKind, GaborEstimator, LONGEST_GAP_S, PlanePoint, WaveEstimate};

@@ -25,8 +25,9 @@ use super::estimator::LONGEST_GAP_S;
 use super::kernel::Kernel;
 use super::smooth::Smoother;
 use super::window::Window;
-use super::{Estimator, GestureOptions, PlanePoint, WaveEstimate};
+use super::{Estimator, PlanePoint, WaveEstimate};
 use crate::base::angle::wrap_tau;
+use crate::gesture::GestureOptions;
 
 /// Filters in the bank.
 const FILTERS: usize = 50;

@@ -107,7 +107,7 @@ impl Smoother {
 
 /// Causal Gaussian smoothing of a progression; without allocation after construction.
 #[derive(Clone, Debug)]
-pub(super) struct ProgressionSmoother {
+pub(in crate::gesture) struct ProgressionSmoother {
     /// Time and value.
     raw: Window<(f64, f64)>,
     sigma_s: f64,

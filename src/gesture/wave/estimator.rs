@@ -1,6 +1,7 @@
 //! What every wave estimator offers: points of a plane in, amplitude, frequency and phase out.
 
-use super::{GaborEstimator, GestureOptions};
+use super::GaborEstimator;
+use crate::gesture::GestureOptions;
 
 /// After a gap in the samples longer than this, in seconds, an estimator begins anew.
 ///
