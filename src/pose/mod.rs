@@ -27,7 +27,7 @@ pub use global::{GlobalFit, GlobalMotion, GlobalOptions};
 pub use reader::{PoseFormat, PoseReader};
 pub use recording::Recording;
 pub use sample::{PoseHeader, PoseSample};
-pub use select::CHANNEL_STROKE_M;
+pub use select::{CHANNEL_STROKE_M, channel_as_point};
 pub use validate::{
     BadSample, FaultCounts, LONGEST_JUMP_S, LONGEST_STEP_S, MAX_BAD_IN_A_ROW, MAX_LINE_BYTES,
     SampleFault, Validator,

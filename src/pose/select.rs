@@ -10,6 +10,16 @@ pub const CHANNEL_STROKE_M: f64 = 0.1;
 /// The circle on which such points stand, metres.
 const CIRCLE_M: f64 = 0.05;
 
+/// Where a channel with this value is as point number `index` of `count`.
+///
+/// It stands at a fixed place of a circle on the ground and moves up by 0.1 m for a value of 1. Since
+/// nothing moves along the ground and no point is an anchor, the removal of global motion leaves
+/// such points as they are.
+pub fn channel_as_point(index: usize, count: usize, value: f64) -> [f64; 3] {
+    let (sin, cos) = (TAU * index as f64 / count.max(1) as f64).sin_cos();
+    [CIRCLE_M * cos, CHANNEL_STROKE_M * value, CIRCLE_M * sin]
+}
+
 impl Recording {
     /// The recording with the points of these names only, in their order.
     ///
@@ -29,26 +39,18 @@ impl Recording {
     }
 
     /// Channels as points, so that gestures can be defined over them: the recording's own points
-    /// give way to one point per named channel, and all channels stay.
-    ///
-    /// Point k stands at a fixed place of a circle on the ground and moves up by 0.1 m for a value
-    /// of 1 (y = 0.1 value). Since nothing moves along the ground and no point is an anchor, the
-    /// removal of global motion leaves such points as they are. A point is named as its channel.
+    /// give way to one point per named channel ([`channel_as_point`]), named like it; channels stay.
     ///
     /// # Errors
     /// A name that is no channel or comes twice, with a suggestion and all names.
     pub fn with_channels_as_points(mut self, names: &[String]) -> Result<Self, String> {
         let columns = columns("channel", names, &self.header.channels)?;
-        let spots: Vec<(f64, f64)> = (0..names.len())
-            .map(|index| (TAU * index as f64 / names.len() as f64).sin_cos())
-            .map(|(sin, cos)| (CIRCLE_M * cos, CIRCLE_M * sin))
-            .collect();
         for sample in &mut self.samples {
-            let place = |(index, (x, z)): (&usize, &(f64, f64))| {
-                let value = sample.channels.get(*index).copied().flatten()?;
-                Some([*x, CHANNEL_STROKE_M * value, *z])
+            let place = |(index, column): (usize, &usize)| {
+                let value = sample.channels.get(*column).copied().flatten()?;
+                Some(channel_as_point(index, columns.len(), value))
             };
-            sample.points = columns.iter().zip(&spots).map(place).collect();
+            sample.points = columns.iter().enumerate().map(place).collect();
             sample.confidence.clear();
         }
         self.header = PoseHeader {

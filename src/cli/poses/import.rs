@@ -32,6 +32,7 @@ Kinds, told from the content (or by --kind):
 
 --as-points makes points of channels, so that gestures can be defined over a face: point k stands still on the
 ground and moves up by 0.1 m as channel k goes from 0 to 1. It replaces the recording's own points; channels stay.
+Gestures defined over such points also read a stream of the channels alone, such as face.jsonl above.
 Times start at 0 and are seconds; lengths are metres, y up.";
 
 /// A recording and how to read it.
