@@ -21,7 +21,8 @@ pub(super) const EXAMPLES: &str = "Examples:
 Kinds, told from the content (or by --kind):
   bvh             BVH motion capture. Joints are points; rotations in the order of the channels; a position
                   channel replaces the OFFSET. The unit is guessed from the skeleton's size unless --unit
-                  tells it; --ends adds the End Sites.
+                  tells it; --ends adds the End Sites. A root that stays at the origin while the hips
+                  below it travel is left out.
   live-link-face  Live Link Face CSV (time code at 60 per second). 52 blendshapes are channels named as in the
                   file, 0..1; --rotations adds the angles of head and eyes, rad. The stream has no points.
   a-frame         A-Frame motion capture JSON. Points head, left, right and, 0.1 m ahead of each, head_tip, ...

@@ -79,15 +79,29 @@ impl BvhFile {
         longest
     }
 
-    /// Length of the bone from the parent to `joint`, in the file's unit; 0 where the joint travels,
-    /// as hips do that carry the body's position below a root that stays at the origin.
+    /// Length of the bone from the parent to `joint`, in the file's unit; 0 where the joint travels.
     fn bone(&self, joint: &BvhJoint) -> f64 {
+        if self.travels(joint) {
+            return 0.0;
+        }
+        joint.local(self.frame(0)).position.norm()
+    }
+
+    /// Whether `joint` moves in its parent's frame, by over a hundredth of its distance from it.
+    fn travels(&self, joint: &BvhJoint) -> bool {
         let first = joint.local(self.frame(0)).position;
         let step = self.frames().div_ceil(FRAMES_LOOKED_AT).max(1);
-        let travels = (0..self.frames()).step_by(step).any(|index| {
+        (0..self.frames()).step_by(step).any(|index| {
             let there = joint.local(self.frame(index)).position;
             (there - first).norm() > 0.01 * first.norm()
-        });
-        if travels { 0.0 } else { first.norm() }
+        })
+    }
+
+    /// Whether joint `index` is the origin of the world and no part of the body: a root that stays
+    /// where it is while a child, the hips, travels.
+    pub fn is_origin(&self, index: usize) -> bool {
+        let is_root = |joint: &BvhJoint| joint.parent.is_none() && !self.travels(joint);
+        self.joints.get(index).is_some_and(is_root)
+            && (self.joints.iter()).any(|child| child.parent == Some(index) && self.travels(child))
     }
 }

@@ -1,4 +1,7 @@
 //! A BVH file as a pose stream: joints as points, metres, seconds from 0.
+//!
+//! A root that stays at the origin while the hips below it travel is no point: it is not part of the
+//! body, and a fit of the body to itself would be held back by it.
 
 use super::{BvhFile, JointPlace, LengthUnit, MAX_BYTES, UnitGuess};
 use crate::pose::{LineFault, PoseHeader, PoseSample, Recording};
@@ -34,6 +37,7 @@ impl BvhStream {
             guess,
             columns: (0..file.joints.len())
                 .filter(|index| options.ends || !file.joints[*index].is_end)
+                .filter(|index| !file.is_origin(*index))
                 .collect(),
             places: Vec::with_capacity(file.joints.len()),
             file,
