@@ -4,9 +4,7 @@ use super::channel::{DerivedChannel, DerivedChannelError, Mixer};
 use super::wave::ProgressionSmoother;
 use super::{Estimator, EstimatorKind, GestureKind, GestureSet, Plane, References};
 use crate::base::angle::wrap_tau;
-use crate::pose::{
-    GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault, channel_as_point,
-};
+use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault, channel_as_point};
 use std::f64::consts::TAU;
 
 /// A point of lower confidence counts as not seen.

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test program uses a part")]
 
 pub mod character;
+pub mod data;
 pub mod folder;
 pub mod limits;
 pub mod program;
@@ -9,3 +10,5 @@ pub mod recipe;
 pub mod simulator;
 pub mod spectrum;
 pub mod targets;
+
+pub use data::shared_data;
