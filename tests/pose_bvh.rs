@@ -6,7 +6,7 @@ use handwave::pose::bvh::{BvhFile, BvhOptions, LengthUnit, UnitGuess, to_recordi
 use handwave::pose::{PoseFormat, PoseReader, Recording};
 use proptest::prelude::*;
 use std::path::Path;
-use support::shared_data;
+use support::data::shared_data;
 
 /// A root that travels, a joint with rotations only, one whose position channel replaces a part of
 /// its offset, and an End Site.

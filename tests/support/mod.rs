@@ -10,5 +10,3 @@ pub mod recipe;
 pub mod simulator;
 pub mod spectrum;
 pub mod targets;
-
-pub use data::shared_data;
