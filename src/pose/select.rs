@@ -1,4 +1,4 @@
-//! Chooses what of a recording goes on: some of its points, or some of its channels as points.
+//! Chooses what of a recording goes on: a stretch of time, points, channels, channels as points.
 
 use super::{PoseHeader, Recording};
 use crate::base::suggest::hint;
@@ -35,6 +35,41 @@ impl Recording {
             }
         }
         self.header.points = names.to_vec();
+        Ok(self)
+    }
+
+    /// The recording with the channels of these names only, in their order.
+    ///
+    /// # Errors
+    /// A name that is no channel or comes twice, with a suggestion and all names.
+    pub fn with_channels(mut self, names: &[String]) -> Result<Self, String> {
+        let columns = columns("channel", names, &self.header.channels)?;
+        for sample in &mut self.samples {
+            let value = |index: &usize| sample.channels.get(*index).copied().flatten();
+            sample.channels = columns.iter().map(value).collect();
+        }
+        self.header.channels = names.to_vec();
+        Ok(self)
+    }
+
+    /// The samples from `from_s` to `to_s` (seconds on the recording's clock, both included), with
+    /// times that start at 0 again.
+    ///
+    /// # Errors
+    /// No sample lies between them.
+    pub fn cut(mut self, from_s: f64, to_s: f64) -> Result<Self, String> {
+        let (first, last) = self.span_s();
+        self.samples
+            .retain(|sample| sample.t >= from_s && sample.t <= to_s);
+        let start = self.span_s().0;
+        for sample in &mut self.samples {
+            sample.t -= start;
+        }
+        if self.samples.is_empty() {
+            return Err(format!(
+                "no sample from {from_s} s to {to_s} s; the recording runs from {first:.3} s to {last:.3} s"
+            ));
+        }
         Ok(self)
     }
 

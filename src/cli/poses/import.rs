@@ -13,6 +13,7 @@ pub(super) const EXAMPLES: &str = "Examples:
   handwave poses import walk.bvh --points Hips,Foot_L,Foot_R --unit cm --out feet.csv
   handwave poses import face.csv --out face.jsonl                blendshapes as channels
   handwave poses import face.csv --as-points JawOpen,MouthSmileLeft --out mouth.csv
+  handwave poses import face.csv --channels JawOpen,MouthFrownLeft --from 10 --to 25 --out part.csv
   handwave poses import tracked.json --out hands.csv             headset and controllers
   handwave poses import dog.txt --table --rate 60 --out dog.csv  x,y,z of every point, no header
   handwave poses import waiting.json --out waiting.csv           a Leap Motion recording
@@ -71,6 +72,15 @@ pub(super) struct ImportArgs {
     /// Keep these points only, in this order.
     #[arg(long, value_delimiter = ',', value_name = "A,B,...")]
     points: Vec<String>,
+    /// Keep these channels only, in this order.
+    #[arg(long, value_delimiter = ',', value_name = "A,B,...")]
+    channels: Vec<String>,
+    /// Leave out what comes before, seconds on the recording's clock.
+    #[arg(long, value_name = "S")]
+    from: Option<f64>,
+    /// Leave out what comes after, seconds on the recording's clock.
+    #[arg(long, value_name = "S")]
+    to: Option<f64>,
     /// Make points of these channels, in this order.
     #[arg(
         long,
@@ -99,6 +109,14 @@ pub(super) fn run(args: ImportArgs) -> Result<ExitStatus, Failure> {
     let chosen = |flag: &str, what: String| {
         Failure::input(format!("{}: {flag}: {what}", args.file.display()))
     };
+    if args.from.is_some() || args.to.is_some() {
+        recording = recording
+            .cut(
+                args.from.unwrap_or(f64::NEG_INFINITY),
+                args.to.unwrap_or(f64::INFINITY),
+            )
+            .map_err(|what| chosen("--from, --to", what))?;
+    }
     if !args.points.is_empty() {
         recording = recording
             .with_points(&args.points)
@@ -108,6 +126,11 @@ pub(super) fn run(args: ImportArgs) -> Result<ExitStatus, Failure> {
         recording = recording
             .with_channels_as_points(&args.as_points)
             .map_err(|what| chosen("--as-points", what))?;
+    }
+    if !args.channels.is_empty() {
+        recording = recording
+            .with_channels(&args.channels)
+            .map_err(|what| chosen("--channels", what))?;
     }
     write(&recording, &args.out)
 }
