@@ -47,7 +47,7 @@ pub fn parse(text: &str, options: &TableOptions) -> Result<Recording, LineFault>
             .map(|cell| number(cell).ok_or_else(|| shown(cell)))
             .collect::<Result<_, _>>()
             .map_err(|found| fault(number_of_line, found, "numbers".into()))?;
-        if values.len() % 3 != 0 {
+        if !values.len().is_multiple_of(3) {
             return Err(fault(
                 number_of_line,
                 format!("{} numbers", values.len()),
