@@ -4,6 +4,7 @@
 //! what is left to one complex number (or a progression), and an [`Estimator`] reads amplitude,
 //! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
 
+mod channel;
 mod define;
 mod file;
 mod front;
@@ -13,6 +14,7 @@ mod separability;
 mod set;
 mod wave;
 
+pub use channel::{DerivedChannel, DerivedChannelError, LONGEST_SMOOTHING_S};
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };
