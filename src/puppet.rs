@@ -16,6 +16,8 @@ use crate::robot::Envelope;
 pub enum LostPolicy {
     /// Come to rest and wait for poses.
     Idle,
+    /// Hold the pose and wait for poses.
+    Hold,
     /// End the run: settle, lie down, torque off.
     Stop,
 }
@@ -33,7 +35,8 @@ pub struct PuppetOptions {
     pub actuation_delay_s: f64,
     /// Age of the last pose up to which gestures go on in phase, seconds.
     pub coast_s: f64,
-    /// Age of the last pose from which poses count as lost, seconds.
+    /// Age of the last pose from which poses count as lost, seconds; until then motion is eased to
+    /// a hold.
     pub lost_s: f64,
     /// What then happens.
     pub on_lost: LostPolicy,
@@ -96,6 +99,7 @@ pub struct Puppet {
     stage_since: Time,
     ramp: Ramp,
     playing_since: Option<Time>,
+    tempo: Tempo,
     rejected: u64,
     estimates: Vec<GestureEstimate>,
     drives: Vec<Drive>,
@@ -112,6 +116,30 @@ struct Ramp {
     from: Vec<f64>,
     to: Vec<f64>,
     seconds: f64,
+}
+
+/// How fast the puppet's own time runs: 1 while poses come, 0 while a pose is held.
+///
+/// To hold is to let time stand still: phases, blends, layers and transitions all stop where they
+/// are and go on from there, and no joint's speed jumps.
+#[derive(Copy, Clone, Debug)]
+struct Tempo {
+    value: f64,
+    /// Time by which the gestures' phases have been held back while poses are missing, seconds.
+    held_s: f64,
+}
+
+/// Highest change of tempo per second, down and up: what it adds to a joint's acceleration is this
+/// times its speed.
+const TEMPO_CHANGE: [f64; 2] = [4.0, 2.0];
+
+impl Tempo {
+    /// Moves towards `goal` and returns the puppet's time that passes in `dt_s`.
+    fn step(&mut self, goal: f64, dt_s: f64) -> f64 {
+        let [down, up] = TEMPO_CHANGE.map(|change| change * dt_s);
+        self.value += (goal - self.value).clamp(-down, up);
+        dt_s * self.value
+    }
 }
 
 /// Share of a joint's speed and acceleration that ramps use.
@@ -153,6 +181,10 @@ impl Puppet {
                 seconds: 0.0,
             },
             playing_since: None,
+            tempo: Tempo {
+                value: 1.0,
+                held_s: 0.0,
+            },
             rejected: 0,
             pose: vec![0.0; joints],
             last_pose: vec![0.0; joints],
@@ -230,11 +262,20 @@ impl Puppet {
         let age = now.secs() - self.front.last_t().map_or(started, |t| t.max(started));
         self.targets.pose_age_s = self.front.last_t().map(|t| now.secs() - t);
         self.targets.poses_lost = share > 0.0 && age > self.options.lost_s;
-        // The ladder: in phase while coasting, then eased out until the poses count as lost.
+        // The ladder: on in phase, then eased to a hold, then what the policy says.
         let fading = (age - self.options.coast_s) / (self.options.lost_s - self.options.coast_s);
-        let share = share * (1.0 - ease(fading));
+        let holds = share > 0.0 && (fading < 1.0 || self.options.on_lost == LostPolicy::Hold);
+        let share = if holds || fading < 1.0 { share } else { 0.0 };
+        let goal = if holds { 1.0 - ease(fading) } else { 1.0 };
+        let dt_s = self.options.dt_s * self.tempo.step(goal, self.options.dt_s);
+        if fading <= 0.0 {
+            self.tempo.held_s = 0.0;
+        } else {
+            self.tempo.held_s += self.options.dt_s - dt_s;
+        }
+        self.front.set_active(self.animator.active());
         for (gesture, estimate) in self.estimates.iter_mut().enumerate() {
-            *estimate = self.front.predict(gesture, actuation);
+            *estimate = self.front.predict(gesture, actuation - self.tempo.held_s);
         }
         for (drive, gesture) in self.drives.iter_mut().zip(&self.gesture_of_class) {
             let estimate = &self.estimates[*gesture];
@@ -254,12 +295,8 @@ impl Puppet {
                 f64::NAN
             };
         }
-        self.animator.step(
-            &self.drives,
-            &self.channels,
-            self.options.dt_s,
-            &mut self.pose,
-        );
+        self.animator
+            .step(&self.drives, &self.channels, dt_s, &mut self.pose);
         let fastest = self
             .pose
             .iter()
@@ -328,6 +365,11 @@ impl Puppet {
     /// Gestures as used in the last step, in file order.
     pub fn estimates(&self) -> &[GestureEstimate] {
         &self.estimates
+    }
+
+    /// The gesture front end.
+    pub fn front(&self) -> &FrontEnd {
+        &self.front
     }
 
     /// The animator.

@@ -11,6 +11,7 @@ mod period;
 mod plane;
 mod separability;
 mod set;
+mod tracker;
 mod wave;
 
 pub use define::{
@@ -22,4 +23,5 @@ pub use period::{PeriodEstimate, find_period};
 pub use plane::{Plane, References};
 pub use separability::{Response, responses};
 pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
+pub use tracker::{PerformerScale, TrackingCounts};
 pub use wave::{Estimator, EstimatorKind, GaborEstimator, LONGEST_GAP_S, PlanePoint, WaveEstimate};

@@ -53,6 +53,8 @@ pub struct GlobalFit {
     translation: bool,
     yaw: bool,
     height: bool,
+    /// What is left of a pose is enlarged by this.
+    scale: f64,
 }
 
 impl GlobalFit {
@@ -81,7 +83,14 @@ impl GlobalFit {
             translation: points >= 3 || (anchor.is_some() && points > 1),
             yaw: options.yaw.unwrap_or(solid && points >= 3),
             height: options.height.unwrap_or(anchor.is_some() || !solid),
+            scale: 1.0,
         })
+    }
+
+    /// Enlarges the poses that [`GlobalFit::remove`] leaves by `scale` from now on: about the body,
+    /// and in height about the ground where height is kept. What is removed stays in metres.
+    pub fn set_scale(&mut self, scale: f64) {
+        self.scale = scale;
     }
 
     /// Sets the weights from how much each point moves in `poses` (each a place per point).
@@ -186,15 +195,21 @@ impl GlobalFit {
             yaw = sine.atan2(cosine);
         }
         let (sin, cos) = yaw.sin_cos();
+        let scale = self.scale;
+        let rise = if self.height {
+            scale * body[1] - home[1]
+        } else {
+            0.0
+        };
         for (place, out) in points.iter().zip(out.iter_mut()) {
             if !self.translation {
-                *out = *place;
+                *out = place.map(|value| scale * value);
                 continue;
             }
-            let (x, z) = (place[0] - body[0], place[2] - body[2]);
+            let (x, z) = (scale * (place[0] - body[0]), scale * (place[2] - body[2]));
             *out = [
                 x * cos - z * sin + home[0],
-                place[1] - if self.height { body[1] - home[1] } else { 0.0 },
+                scale * place[1] - rise,
                 x * sin + z * cos + home[2],
             ];
         }
