@@ -267,7 +267,7 @@ impl Puppet {
         let holds = share > 0.0 && (fading < 1.0 || self.options.on_lost == LostPolicy::Hold);
         let share = if holds || fading < 1.0 { share } else { 0.0 };
         let goal = if holds { 1.0 - ease(fading) } else { 1.0 };
-        let dt_s = self.options.dt_s * self.tempo.step(goal, self.options.dt_s);
+        let dt_s = self.tempo.step(goal, self.options.dt_s);
         if fading <= 0.0 {
             self.tempo.held_s = 0.0;
         } else {
