@@ -16,6 +16,7 @@
 //! - With fewer than three points and no anchor there is no body to speak of: nothing is removed.
 
 use super::PoseHeader;
+use crate::base::angle::wrap_pi;
 use std::f64::consts::PI;
 
 /// What is removed; `None` asks for the default of the point set.
@@ -182,6 +183,12 @@ impl GlobalFit {
         seen: Option<&[bool]>,
         out: &mut [[f64; 3]],
     ) -> GlobalMotion {
+        self.remove_leaning(points, seen, 0.0, out)
+    }
+
+    /// Yaw of the pose against the reference as fitted to the points that are seen, rad; 0 where
+    /// yaw is not removed.
+    pub fn yaw(&self, points: &[[f64; 3]], seen: Option<&[bool]>) -> f64 {
         let (body, home) = self.bodies(points, seen);
         let mut yaw = 0.0;
         if self.yaw {
@@ -193,6 +200,23 @@ impl GlobalFit {
                 cosine += weight * (px * qx + pz * qz);
             }
             yaw = sine.atan2(cosine);
+        }
+        yaw
+    }
+
+    /// As [`GlobalFit::remove`], where the points that are seen are known to make the yaw `lean_rad`
+    /// larger than all of them would.
+    pub fn remove_leaning(
+        &self,
+        points: &[[f64; 3]],
+        seen: Option<&[bool]>,
+        lean_rad: f64,
+        out: &mut [[f64; 3]],
+    ) -> GlobalMotion {
+        let (body, home) = self.bodies(points, seen);
+        let mut yaw = self.yaw(points, seen);
+        if self.yaw && lean_rad != 0.0 {
+            yaw = wrap_pi(yaw - lean_rad);
         }
         let (sin, cos) = yaw.sin_cos();
         let scale = self.scale;

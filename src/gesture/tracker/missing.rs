@@ -11,9 +11,9 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector, SymmetricEigen};
 /// Principal components kept at most.
 const COMPONENTS: usize = 8;
 /// Components with less than this share of the variance are noise.
-const LEAST_SHARE: f64 = 1e-3;
+const LEAST_SHARE: f64 = 1e-5;
 /// How far a pose may be from what the components span, as a share of the gestures' size.
-const MISFIT_SHARE: f64 = 0.02;
+const MISFIT_SHARE: f64 = 0.01;
 /// A point that was elsewhere than expected when it was last seen comes over within this time, seconds.
 const CARRY_S: f64 = 0.5;
 
