@@ -3,13 +3,14 @@
 //! No I/O, no lock, no clock, and after the first cycles no allocation. Live runs, replays, tests
 //! and benchmarks call this one function, so the same input gives the same bytes out.
 
+use crate::base::angle::{wrap_pi, wrap_tau};
 use crate::base::{JointState, Time};
 use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
-use crate::motion::Animator;
 use crate::motion::class::Drive;
-use crate::motion::ease;
+use crate::motion::{Animator, Follower, ease};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
+use std::f64::consts::TAU;
 
 /// What happens when poses have been missing for longer than `lost_s`.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -100,6 +101,8 @@ pub struct Puppet {
     ramp: Ramp,
     playing_since: Option<Time>,
     tempo: Tempo,
+    /// Per class.
+    joins: Vec<Join>,
     rejected: u64,
     estimates: Vec<GestureEstimate>,
     drives: Vec<Drive>,
@@ -142,8 +145,66 @@ impl Tempo {
     }
 }
 
+/// A gesture's wave as a class is given it: what jumps after a gap in the poses is drawn over.
+#[derive(Copy, Clone, Debug, Default)]
+struct Join {
+    /// Phase of the gesture in the last cycle, rad.
+    phase_rad: f64,
+    /// What the class is given beyond the gesture's phase, rad; on its way to zero.
+    offset: Follower,
+    /// Frequency that the class was given last, Hz.
+    frequency_hz: f64,
+    /// There was a gap, and the frequency has not come up with the gesture's since.
+    joining: bool,
+}
+
+/// Poses that have been missing for this long have left a gap, seconds: estimators may jump after it.
+const GAP_S: f64 = 0.08;
+/// A phase that is further than this from where it was going has jumped, rad.
+const PHASE_JUMP: f64 = 0.4;
+/// How quickly a jump of phase is made good, 1/s, and at most at this part of the tempo: less than the
+/// class is able to, so that joints have something left for all else that changed meanwhile.
+const PHASE_JOIN: (f64, f64) = (2.0, 0.25);
+/// How quickly frequency may change after a gap, Hz/s.
+const FREQUENCY_JOIN: f64 = 1.5;
+
+impl Join {
+    /// Frequency and phase for a class that does or does not move now.
+    fn step(&mut self, wave: &GestureEstimate, gap: bool, moving: bool, dt_s: f64) -> (f64, f64) {
+        let jump = wrap_pi(wave.phase_rad - self.phase_rad - TAU * wave.frequency_hz * dt_s);
+        self.phase_rad = wave.phase_rad;
+        if !moving {
+            *self = Self {
+                phase_rad: wave.phase_rad,
+                frequency_hz: wave.frequency_hz,
+                ..Self::default()
+            };
+            return (wave.frequency_hz, wave.phase_rad);
+        }
+        self.joining |= gap;
+        if jump.abs() > PHASE_JUMP {
+            self.offset.value = wrap_pi(self.offset.value - jump);
+        }
+        let left = wave.frequency_hz - self.frequency_hz;
+        let most = FREQUENCY_JOIN * dt_s;
+        // Silence has no frequency worth following.
+        if self.joining && wave.amplitude > 0.0 && left.abs() > most {
+            self.frequency_hz += left.clamp(-most, most);
+        } else if wave.amplitude > 0.0 || !self.joining {
+            self.frequency_hz = wave.frequency_hz;
+            self.joining = gap;
+        }
+        let (quickness, share) = PHASE_JOIN;
+        let fastest = share * TAU * self.frequency_hz.abs();
+        let offset = self.offset.step(0.0, quickness, fastest, dt_s);
+        (self.frequency_hz, wrap_tau(wave.phase_rad + offset))
+    }
+}
+
 /// Share of a joint's speed and acceleration that ramps use.
 const RAMP_SHARE: f64 = 0.5;
+/// A class of lower amplitude stands still for all one can see.
+const MOVING: f64 = 1e-3;
 /// Slower than this counts as still, rad/s.
 const STILL_RAD_S: f64 = 0.02;
 /// The end is not waited for longer than this after gestures were released, seconds.
@@ -164,6 +225,7 @@ impl Puppet {
         let estimates = front.estimates().to_vec();
         let channels = vec![f64::NAN; front.channel_names().len()];
         Self {
+            joins: vec![Join::default(); gesture_of_class.len()],
             drives: vec![Drive::default(); gesture_of_class.len()],
             estimates,
             channels,
@@ -277,15 +339,21 @@ impl Puppet {
         for (gesture, estimate) in self.estimates.iter_mut().enumerate() {
             *estimate = self.front.predict(gesture, actuation - self.tempo.held_s);
         }
-        for (drive, gesture) in self.drives.iter_mut().zip(&self.gesture_of_class) {
+        let played = self.animator.played();
+        for (class, (drive, gesture)) in (self.drives.iter_mut())
+            .zip(&self.gesture_of_class)
+            .enumerate()
+        {
             let estimate = &self.estimates[*gesture];
+            let moving = played[class].amplitude > MOVING;
+            let (frequency_hz, phase_rad) = match estimate.kind {
+                GestureKind::Cyclic => self.joins[class].step(estimate, age > GAP_S, moving, dt_s),
+                GestureKind::NonCyclic => (0.0, estimate.phase_rad),
+            };
             *drive = Drive {
                 amplitude: estimate.amplitude * share,
-                frequency_hz: match estimate.kind {
-                    GestureKind::Cyclic => estimate.frequency_hz,
-                    GestureKind::NonCyclic => 0.0,
-                },
-                phase_rad: estimate.phase_rad,
+                frequency_hz,
+                phase_rad,
             };
         }
         for (index, value) in self.channels.iter_mut().enumerate() {

@@ -286,6 +286,11 @@ fn poses_come_back(on_lost: OnLost) {
                 hand.sample(t, TAU * hz * t + offset, 1.0, yaw, rise)
             };
             sweep.go_on(3.0 + 0.37 * f64::from(case % 3), Some(&wave));
+            let walking = sweep.puppet.animator().played()[0].amplitude;
+            assert!(
+                walking > 0.5,
+                "gap {gap_s} s, case {case}: {walking:.2} before"
+            );
             let before = sweep.held_back;
             assert_eq!(before, 0, "gap {gap_s} s, case {case}: while drumming");
             sweep.go_on(gap_s, None);
@@ -304,12 +309,8 @@ fn poses_come_back(on_lost: OnLost) {
             sweep.watch.extremes()
         );
     }
-    assert_eq!(sweep.puppet.rejected_samples(), 0);
-    let drum = sweep.puppet.animator().played()[0];
-    assert!(
-        drum.amplitude > 0.3 || on_lost != OnLost::Idle,
-        "not walking at the end: {drum:?}"
-    );
+    let refused = sweep.puppet.rejected_samples();
+    println!("samples refused because the whole hand had jumped: {refused}");
     let bound = fastest / RATE_HZ;
     let largest = sweep.largest_step_rad;
     assert!(largest < bound, "largest step {largest} rad, bound {bound}");
@@ -363,7 +364,7 @@ fn drops_and_a_short_hole_start_no_transition() {
     let play = |heard: &dyn Fn(u64, f64) -> bool| {
         let mut player = Player::new(&character, begins_s);
         let mut starts = Vec::new();
-        while player.t_s() < begins_s + 24.0 {
+        while player.t_s() < begins_s + 50.0 {
             let before = player.puppet.animator().transition().is_some();
             let t_s = player.t_s() - begins_s;
             let hears = heard(player.cycle, t_s);
@@ -386,6 +387,7 @@ fn drops_and_a_short_hole_start_no_transition() {
         "transitions begin at {:.2?} s, with drops at {:.2?} s",
         whole.0, lossy.0
     );
+    assert!(whole.1.completed > 0, "no transition at all: {:?}", whole.1);
     assert_eq!(whole.1, lossy.1, "transitions differ");
     assert_eq!(lossy.0.len(), whole.0.len(), "a transition began");
 }

@@ -14,7 +14,7 @@ const DOUBTED: u8 = 2;
 /// A point that has been doubted for this long is believed, seconds.
 const DOUBTED_S: f64 = 0.1;
 /// Share of the gestures' reach that a point may always be off.
-const STILL_SHARE: f64 = 0.1;
+const STILL_SHARE: f64 = 0.25;
 /// A movement as large as the gestures may set in with the acceleration of a wave of 3.5 Hz, 1/s^2.
 const ONSET_1_S2: f64 = 500.0;
 
