@@ -146,6 +146,7 @@ impl FrontEnd {
         // Jumps are judged in the tracker's own metres.
         let reach_m = references.reach_m / scale.unwrap_or(1.0);
         let completion = Completion::new(&references);
+        let rest = RestMeasure::new(&home, &references);
         let fit_whole = references.fit;
         let mut fit = fit_whole.clone();
         fit.set_scale(scale.unwrap_or(1.0));
@@ -160,7 +161,7 @@ impl FrontEnd {
             outliers: OutlierFilter::new(points, reach_m),
             completion,
             filled: 0,
-            rest: RestMeasure::new(&set.reference),
+            rest,
             scale,
             places: vec![[0.0; 3]; points],
             seen: vec![false; points],

@@ -1,6 +1,8 @@
 //! One scale per performer: a child's hand and an adult's work with one gesture file.
 
+use crate::gesture::References;
 use crate::pose::global::size_of;
+use nalgebra::DVector;
 
 /// The pose must be still for this long to be measured, seconds.
 const STILL_S: f64 = 1.0;
@@ -56,32 +58,58 @@ impl std::str::FromStr for PerformerScale {
     }
 }
 
-/// Waits for a still pose and compares its size with the reference's.
+/// Reference poses that a still pose is compared with at most.
+const POSTURES: usize = 64;
+/// Pairs of points that are compared at most.
+const PAIRS: usize = 512;
+
+/// Waits for a still pose and compares its size with the gesture file's.
 ///
-/// The scale is the median, over all pairs of points, of their distance in the reference by their
-/// distance in the still pose: a finger held otherwise does not count.
+/// Performers rest in one of the postures they were recorded in: the still pose is compared with
+/// the reference frame, the mean poses and frames of all gestures, and the one whose proportions
+/// (distances between points) fit best is the one that counts. The scale is the median over the pairs
+/// of points of their distance there by their distance in the still pose.
 #[derive(Clone, Debug)]
 pub(in crate::gesture) struct RestMeasure {
-    reference: Vec<[f64; 3]>,
+    pairs: Vec<(usize, usize)>,
+    /// Per posture the distance of every pair, metres.
+    postures: Vec<Vec<f64>>,
     /// Where the points were when they came to rest, since when, and sum and count of places since.
     at: Vec<[f64; 3]>,
     since: Option<f64>,
     sums: Vec<[f64; 3]>,
     counts: Vec<f64>,
+    live: Vec<f64>,
     ratios: Vec<f64>,
 }
 
 impl RestMeasure {
-    /// Compares with `reference`, one place per point, metres.
-    pub fn new(reference: &[[f64; 3]]) -> Self {
-        let points = reference.len();
+    /// Compares with `home` (the reference frame, one place per point) and the gestures' frames.
+    pub fn new(home: &[[f64; 3]], references: &References) -> Self {
+        let points = home.len();
+        let all: Vec<(usize, usize)> = (0..points)
+            .flat_map(|a| (0..a).map(move |b| (a, b)))
+            .collect();
+        let pairs: Vec<(usize, usize)> = thinned(&all, PAIRS).copied().collect();
+        let frames: Vec<&DVector<f64>> = references.local.iter().flatten().collect();
+        let poses = thinned(&frames, POSTURES).copied().chain(&references.mean);
+        let flat = std::iter::once(home.as_flattened()).chain(poses.map(DVector::as_slice));
+        let postures = flat.map(|pose| {
+            let place = |point: usize| [0, 1, 2].map(|axis| pose[3 * point + axis]);
+            pairs
+                .iter()
+                .map(|(a, b)| distance(place(*a), place(*b)))
+                .collect()
+        });
         Self {
-            reference: reference.to_vec(),
+            postures: postures.collect(),
             at: vec![[0.0; 3]; points],
             since: None,
             sums: vec![[0.0; 3]; points],
             counts: vec![0.0; points],
-            ratios: Vec::with_capacity(points * points.saturating_sub(1) / 2),
+            live: vec![0.0; pairs.len()],
+            ratios: Vec::with_capacity(pairs.len()),
+            pairs,
         }
     }
 
@@ -89,8 +117,7 @@ impl RestMeasure {
     pub fn push(&mut self, t: f64, places: &[[f64; 3]], seen: &[bool]) -> Option<f64> {
         let bound = STILL_SHARE * size_of(&self.at);
         let moved = |(index, place): (usize, &[f64; 3])| {
-            let squared: f64 = (0..3).map(|a| (place[a] - self.at[index][a]).powi(2)).sum();
-            seen[index] && !(squared.sqrt() <= bound)
+            seen[index] && !(distance(*place, self.at[index]) <= bound)
         };
         if self.since.is_none() || places.iter().enumerate().any(moved) {
             self.since = None;
@@ -111,20 +138,16 @@ impl RestMeasure {
         if t - since < STILL_S {
             return None;
         }
-        self.ratios.clear();
-        for a in 0..self.at.len() {
-            for b in 0..a {
-                let distance = |place: &dyn Fn(usize, usize) -> f64| {
-                    let squared: f64 = (0..3).map(|k| (place(a, k) - place(b, k)).powi(2)).sum();
-                    squared.sqrt()
-                };
-                let live = distance(&|point, k| self.sums[point][k] / self.counts[point]);
-                let reference = distance(&|point, k| self.reference[point][k]);
-                if live > 0.0 && reference > 0.0 {
-                    self.ratios.push(reference / live);
-                }
-            }
+        for (live, (a, b)) in self.live.iter_mut().zip(&self.pairs) {
+            let place = |point: usize| self.sums[point].map(|sum| sum / self.counts[point]);
+            *live = distance(place(*a), place(*b));
         }
+        let posture = (self.postures.iter())
+            .min_by(|a, b| misfit(a, &self.live).total_cmp(&misfit(b, &self.live)))?;
+        self.ratios.clear();
+        let known = posture.iter().zip(&self.live);
+        let ratios = known.map(|(reference, live)| reference / live);
+        (self.ratios).extend(ratios.filter(|ratio| ratio.is_finite() && *ratio > 0.0));
         self.ratios.sort_unstable_by(f64::total_cmp);
         let middle = self.ratios.len() / 2;
         let median = match self.ratios.len() {
@@ -144,4 +167,23 @@ impl RestMeasure {
     pub fn reset(&mut self) {
         self.since = None;
     }
+}
+
+/// At most `most` of `all`, evenly spread.
+fn thinned<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
+    all.iter().step_by(all.len().div_ceil(most).max(1))
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3)
+        .map(|axis| (a[axis] - b[axis]).powi(2))
+        .sum::<f64>()
+        .sqrt()
+}
+
+/// How badly distances fit the live ones after the best enlargement: 0 for the same proportions.
+fn misfit(posture: &[f64], live: &[f64]) -> f64 {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let fit = product(posture, live);
+    1.0 - fit * fit / (product(posture, posture) * product(live, live)).max(1e-300)
 }
