@@ -7,6 +7,7 @@
 mod channel;
 mod define;
 mod file;
+mod foreign;
 mod front;
 mod period;
 mod plane;

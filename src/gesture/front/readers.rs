@@ -1,6 +1,7 @@
 //! One reader per gesture and neighbourhood of the motion graph: its plane and what reads it.
 
 use crate::base::angle::wrap_tau;
+use crate::gesture::foreign::{Span, Trust};
 use crate::gesture::wave::ProgressionSmoother;
 use crate::gesture::{
     Estimator, EstimatorKind, GestureKind, GestureOptions, GestureSet, Plane, References,
@@ -50,6 +51,7 @@ struct Reader {
     /// Gestures that its plane keeps apart from its own.
     known: Vec<usize>,
     plane: Plane,
+    trust: Trust,
     reading: Reading,
     estimate: GestureEstimate,
 }
@@ -62,6 +64,7 @@ struct Reader {
 /// kept warm, and going from node to node only changes which ones are listened to.
 pub(super) struct Readers {
     readers: Vec<Reader>,
+    span: Span,
     /// Per neighbourhood and gesture its reader; `None` where the gesture is out of reach.
     sets: Vec<Vec<Option<usize>>>,
     /// Neighbourhood of each node.
@@ -117,6 +120,12 @@ impl Readers {
                                 ProgressionSmoother::new(settings.progression_smoothing_s),
                             ),
                         },
+                        trust: Trust::new(
+                            references,
+                            *gesture,
+                            set.gestures[*gesture].duration_s,
+                            &plane,
+                        ),
                         plane,
                         estimate: GestureEstimate::silent(kind),
                     });
@@ -127,6 +136,7 @@ impl Readers {
         let kinds = set.gestures.iter().map(|gesture| gesture.kind);
         Self {
             readers,
+            span: Span::new(set, references),
             sets,
             set_of_node,
             active: 0,
@@ -137,16 +147,31 @@ impl Readers {
 
     /// Reads the flat pose at `t`, of which the share `seen` was seen.
     pub fn push(&mut self, t: f64, flat: &[f64], seen: f64) {
+        let outside = self.span.outside(flat);
         for reader in &mut self.readers {
             let (plane, estimate) = (&reader.plane, &mut reader.estimate);
             match &mut reader.reading {
                 Reading::Wave(estimator) => {
-                    estimator.push(t, plane.apply(flat, self.with_variance));
+                    let mut point = plane.apply(flat, self.with_variance);
+                    point.trust = reader.trust.push(t, outside, point.z);
+                    if std::env::var("ZED").is_ok() {
+                        eprintln!(
+                            "{t:.3} {:.3} {:.3} {:?}",
+                            point.z[0],
+                            point.z[1],
+                            plane.shape()
+                        );
+                    }
+                    estimator.push(t, point);
                     let wave = estimator.estimate();
                     estimate.amplitude = wave.amplitude;
                     estimate.frequency_hz = wave.frequency_hz;
                     estimate.phase_rad = wave.phase_rad;
-                    estimate.quality = wave.quality;
+                    estimate.quality = if std::env::var("TRUST").is_ok() {
+                        point.trust
+                    } else {
+                        wave.quality
+                    };
                 }
                 Reading::Progression(smoother) => {
                     let progression = smoother.push(t, plane.apply(flat, false).z[0]);
@@ -192,6 +217,7 @@ impl Readers {
     /// Forgets all samples; the neighbourhood stays.
     pub fn reset(&mut self) {
         for reader in &mut self.readers {
+            reader.trust.reset();
             match &mut reader.reading {
                 Reading::Wave(estimator) => estimator.reset(),
                 Reading::Progression(smoother) => smoother.reset(),
