@@ -358,7 +358,7 @@ fn poses_that_come_back_held_start_nothing() {
 }
 
 #[test]
-fn drops_and_a_short_hole_start_no_transition() {
+fn drops_a_short_hole_and_changing_rates_start_no_transition() {
     let character = built_in();
     let begins_s = character.safety.ramp_s + 0.005;
     let play = |heard: &dyn Fn(u64, f64) -> bool| {
@@ -383,6 +383,15 @@ fn drops_and_a_short_hole_start_no_transition() {
             && !(8.0..8.3).contains(&t_s)
             && !(16.0..16.3).contains(&t_s)
     });
+    // 108 Hz, then 22 Hz, then 54 Hz, all in mid-gesture.
+    let uneven = play(&|cycle, t_s| match t_s {
+        ..15.0 => true,
+        15.0..31.0 => cycle % 5 == 0,
+        _ => cycle % 2 == 0,
+    });
+    println!("at rates that change at {:.2?} s", uneven.0);
+    assert_eq!(whole.1, uneven.1, "transitions differ");
+    assert_eq!(uneven.0.len(), whole.0.len(), "a transition began");
     println!(
         "transitions begin at {:.2?} s, with drops at {:.2?} s",
         whole.0, lossy.0

@@ -124,7 +124,7 @@ fn tracking_lines(report: &Report) -> String {
         );
     }
     match report.performer_scale {
-        Some(scale) if scale == 1.0 => {}
+        Some(1.0) => {}
         Some(scale) => text += &format!("performer     scale {scale:.3}\n"),
         None => {
             text += "performer     scale never measured: no still second with all points seen; declare it with --scale NUMBER\n";
