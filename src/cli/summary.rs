@@ -118,10 +118,7 @@ fn tracking_lines(report: &Report) -> String {
     let mended = &report.tracking;
     let mut text = String::new();
     if *mended != TrackingCounts::default() {
-        text += &format!(
-            "tracker       {} points rejected, {} filled in, left and right put back in {} samples\n",
-            mended.outliers, mended.filled, mended.swapped
-        );
+        text += &format!("tracker       {mended}\n");
     }
     match report.performer_scale {
         Some(1.0) => {}
