@@ -38,7 +38,7 @@ impl GestureEstimate {
 }
 
 /// Two planes whose answers differ by less than this to every frame that either knows are one.
-const SAME_ANSWER: f64 = 0.02;
+const SAME_ANSWER: f64 = 0.05;
 
 /// How one gesture is read.
 enum Reading {
