@@ -314,7 +314,7 @@ impl FastEstimator {
         let since_s = 1.0 / candidate.frequency_hz.abs();
         let fit = self
             .task(omega, since_s, 0.01, prior)
-            .from_frequency(omega, C::default(), 2)?;
+            .at_frequency(omega, C::default(), 2)?;
         let lock = Lock {
             wave: fit.wave,
             noise: fit.residual,

@@ -248,7 +248,7 @@ impl Task<'_> {
     }
 
     /// Steps from a frequency alone: first the wave, then `steps` corrections of its frequency.
-    pub fn from_frequency(&self, omega: f64, constant: C, steps: usize) -> Option<Fit> {
+    pub fn at_frequency(&self, omega: f64, constant: C, steps: usize) -> Option<Fit> {
         let start = Wave {
             omega,
             c: constant,

@@ -68,7 +68,7 @@ impl LeastSquaresEstimator {
                 omega: 0.3,
             },
         };
-        let Some(fit) = task.from_frequency(TAU * seed.frequency_hz, C::default(), 3) else {
+        let Some(fit) = task.at_frequency(TAU * seed.frequency_hz, C::default(), 3) else {
             return silent;
         };
         let hz = fit.wave.omega / TAU;
