@@ -74,14 +74,10 @@ fn scales_that_nobody_has_are_refused() {
         ("scale = \"reast\"", "input.scale"),
         ("scale = 20", "input.scale"),
     ] {
-        folder.edit(
-            "quadruped.toml",
-            "window = 0.5 ",
-            &format!("{written}\nwindow = 0.5 "),
-        );
+        folder.edit("quadruped.toml", "scale = 1.0 ", &format!("{written} "));
         let ended = run_virtual(&[&folder.text("quadruped.toml")]).expect(2);
         assert!(ended.err.contains(line), "{written}: {}", ended.err);
-        folder.edit("quadruped.toml", &format!("{written}\n"), "");
+        folder.edit("quadruped.toml", &format!("{written} "), "scale = 1.0 ");
     }
 }
 
