@@ -74,14 +74,10 @@ fn scales_that_nobody_has_are_refused() {
         ("scale = \"reast\"", "input.scale"),
         ("scale = 20", "input.scale"),
     ] {
-        folder.edit(
-            "quadruped.toml",
-            "window = 0.5 ",
-            &format!("{written}\nwindow = 0.5 "),
-        );
+        folder.edit("quadruped.toml", "scale = 1.0 ", &format!("{written} "));
         let ended = run_virtual(&[&folder.text("quadruped.toml")]).expect(2);
         assert!(ended.err.contains(line), "{written}: {}", ended.err);
-        folder.edit("quadruped.toml", &format!("{written}\n"), "");
+        folder.edit("quadruped.toml", &format!("{written} "), "scale = 1.0 ");
     }
 }
 
@@ -190,10 +186,14 @@ fn a_scale_is_measured_once_and_only_at_rest() {
 fn run_and_estimate_take_a_scale_and_say_what_was_measured() {
     let folder = Folder::empty();
     let (_, recording) = bundled();
-    let small = Recording {
+    let mut small = Recording {
         samples: resized(&recording.samples, 0.6),
         header: recording.header.clone(),
     };
+    // A finger jumps for two samples: what is mended is said, too.
+    for sample in &mut small.samples[600..602] {
+        sample.points[2].as_mut().expect("seen")[1] += 0.4;
+    }
     let path = std::path::PathBuf::from(folder.text("small.jsonl"));
     small.write(&path).expect("writable");
     let input = format!("file:{}", path.display());
@@ -205,7 +205,13 @@ fn run_and_estimate_take_a_scale_and_say_what_was_measured() {
         .concat();
         run_virtual(&args).expect(0).json()
     };
-    assert_eq!(run(&[])["performer_scale"], 1.0);
+    let plain = run(&[]);
+    assert_eq!(plain["performer_scale"], 1.0);
+    assert_eq!(
+        [&plain["points_rejected"], &plain["points_filled"]],
+        [2, 2],
+        "{plain}"
+    );
     assert_eq!(run(&["--scale", "1.6667"])["performer_scale"], 1.6667);
     let measured = run(&["--scale", "rest"])["performer_scale"].clone();
     let measured = measured.as_f64().expect("a number");

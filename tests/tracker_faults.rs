@@ -250,14 +250,14 @@ fn a_missing_hand_is_where_the_elbow_says() {
 }
 
 #[test]
-fn a_finger_of_a_real_hand_may_be_hidden() {
+fn a_point_of_a_real_hand_may_be_hidden() {
     let configs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
     let set = GestureSet::load(&configs.join("gestures/hand.toml")).expect("bundled");
     let file = configs.join("performances/drum_and_splay.jsonl");
     let performance = Recording::read(&file).expect("bundled").0;
-    // Amplitude and phase, hidden at random and for as long as a period.
-    let mut worst = [[0.0_f64; 2]; 2];
-    for finger in 1..performance.header.points.len() {
+    // Frozen where it was, the ring finger, which carries most of the drumming, costs nine tenths of
+    // the amplitude when it is hidden for a period.
+    for finger in 0..performance.header.points.len() {
         for (name, hole) in [("30 % at random", false), ("for 1 s", true)] {
             let (mut clean, mut spoilt) = [(); 2]
                 .map(|()| {
@@ -267,6 +267,7 @@ fn a_finger_of_a_real_hand_may_be_hidden() {
                 .into();
             let mut random = Random(6);
             let (mut largest, mut turn) = (0.0_f64, 0.0_f64);
+            let (mut off_m, mut off_rad) = (0.0_f64, 0.0_f64);
             for good in performance
                 .samples
                 .iter()
@@ -282,6 +283,9 @@ fn a_finger_of_a_real_hand_may_be_hidden() {
                 }
                 clean.push(good).expect("good sample");
                 spoilt.push(&bad).expect("enough points");
+                let (here, there) = (clean.global_motion(), spoilt.global_motion());
+                off_m = off_m.max((here.height_m - there.height_m).abs());
+                off_rad = off_rad.max(wrap_pi(here.yaw_rad - there.yaw_rad).abs());
                 if good.t > 14.5 {
                     let (truth, read) = (clean.estimates()[0], spoilt.estimates()[0]);
                     largest = largest.max((read.amplitude / truth.amplitude - 1.0).abs());
@@ -289,22 +293,21 @@ fn a_finger_of_a_real_hand_may_be_hidden() {
                 }
             }
             let hidden = &performance.header.points[finger];
-            println!("{hidden} hidden {name}: amplitude off {largest:.3}, phase {turn:.3} cycles");
-            let [amplitude, phase] = &mut worst[usize::from(hole)];
-            *amplitude = amplitude.max(largest);
-            *phase = phase.max(turn);
+            println!(
+                "{hidden} hidden {name}: amplitude off {largest:.3}, phase {turn:.3} cycles, height {off_m:.4} m, yaw {off_rad:.3} rad"
+            );
+            // Nothing but the palm tells where the hand as a whole is: without it for long, what
+            // the fingers do together is lost.
+            let most = match (hole, finger) {
+                (false, _) => [0.02, 0.02, 0.02, 0.1],
+                (true, 0) => [0.3, 0.1, 0.02, 0.2],
+                (true, _) => [0.12, 0.1, 0.02, 0.2],
+            };
+            for (off, most) in [largest, turn, off_m, off_rad].into_iter().zip(most) {
+                assert!(off < most, "{hidden} hidden {name}: {off:.3}, bound {most}");
+            }
         }
     }
-    let [at_random, for_a_period] = worst;
-    assert!(
-        at_random[0] < 0.02 && at_random[1] < 0.02,
-        "at random: {at_random:.3?}"
-    );
-    // The ring finger carries most of the drumming; frozen where it was, it costs nine tenths.
-    assert!(
-        for_a_period[0] < 0.12 && for_a_period[1] < 0.1,
-        "for 1 s: {for_a_period:.3?}"
-    );
 }
 
 #[test]

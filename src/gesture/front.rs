@@ -9,7 +9,7 @@ pub use readers::GestureEstimate;
 use super::channel::{DerivedChannel, DerivedChannelError, Mixer};
 use super::tracker::{Completion, OutlierFilter, RestMeasure, SideSwaps};
 use super::{GestureKind, GestureSet, PerformerScale, References, TrackingCounts};
-use crate::base::angle::{wrap_pi, wrap_tau};
+use crate::base::angle::wrap_tau;
 use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault, channel_as_point};
 use readers::Readers;
 use std::f64::consts::TAU;
@@ -26,8 +26,6 @@ const GLOBAL_CHANNELS: [&str; 5] = ["yaw_rad", "height_m", "distance_m", "x_m", 
 /// server) and allocates nothing.
 pub struct FrontEnd {
     fit: GlobalFit,
-    /// The same for poses that are complete and of the gestures' size.
-    fit_whole: GlobalFit,
     /// Index in the stream of each point of the set; of a channel where the stream has no points.
     columns: Vec<usize>,
     stream_points: usize,
@@ -156,14 +154,12 @@ impl FrontEnd {
         let reach_m = references.reach_m / scale.unwrap_or(1.0);
         let completion = Completion::new(&references);
         let rest = RestMeasure::new(&home, &references);
-        let fit_whole = references.fit;
-        let mut fit = fit_whole.clone();
+        let mut fit = references.fit;
         fit.set_scale(scale.unwrap_or(1.0));
         Ok(Self {
             columns: set.header.points.iter().filter_map(find).collect(),
             stream_points: stream.points.len(),
             fit,
-            fit_whole,
             readers,
             trust_tracker: options.trust_tracker,
             swaps: SideSwaps::new(&set.header.points),
@@ -272,16 +268,13 @@ impl FrontEnd {
                 self.readers.reset();
             }
         }
-        let seen = Some(&self.seen[..]);
-        // A fit without some of the points sees the body turned by as much as it would have seen the
-        // last pose, in which all points have a place, turned without them.
-        let lean = if share < 1.0 && self.last_t.is_some() {
-            let yaw = |seen| self.fit_whole.yaw(&self.local, seen);
-            wrap_pi(yaw(seen) - yaw(None))
+        self.motion = if share < 1.0 && self.last_t.is_some() {
+            let (places, seen, last) = (&self.places, &self.seen, &self.local);
+            (self.fit).remove_incomplete(places, seen, last, &mut self.fresh)
         } else {
-            0.0
+            let seen = Some(&self.seen[..]);
+            self.fit.remove(&self.places, seen, &mut self.fresh)
         };
-        self.motion = (self.fit).remove_leaning(&self.places, seen, lean, &mut self.fresh);
         let mut filled = 0;
         for (weight, seen) in self.weights.iter_mut().zip(&self.seen) {
             if !*seen {

@@ -183,41 +183,69 @@ impl GlobalFit {
         seen: Option<&[bool]>,
         out: &mut [[f64; 3]],
     ) -> GlobalMotion {
-        self.remove_leaning(points, seen, 0.0, out)
-    }
-
-    /// Yaw of the pose against the reference as fitted to the points that are seen, rad; 0 where
-    /// yaw is not removed.
-    pub fn yaw(&self, points: &[[f64; 3]], seen: Option<&[bool]>) -> f64 {
         let (body, home) = self.bodies(points, seen);
-        let mut yaw = 0.0;
-        if self.yaw {
-            let (mut sine, mut cosine) = (0.0, 0.0);
-            for (place, reference, weight) in self.rows(points, seen) {
-                let (px, pz) = (place[0] - body[0], place[2] - body[2]);
-                let (qx, qz) = (reference[0] - home[0], reference[2] - home[2]);
-                sine += weight * (px * qz - pz * qx);
-                cosine += weight * (px * qx + pz * qz);
-            }
-            yaw = sine.atan2(cosine);
-        }
-        yaw
+        let yaw = self.yaw(points, seen);
+        self.place(points, (body, home), yaw, out);
+        Self::motion_of(body, home, yaw)
     }
 
-    /// As [`GlobalFit::remove`], where the points that are seen are known to make the yaw `lean_rad`
-    /// larger than all of them would.
-    pub fn remove_leaning(
+    /// As [`GlobalFit::remove`] for a pose of which some points are not `seen`, where `last` is a
+    /// pose without global motion, shortly before, in which all points have a place.
+    ///
+    /// Without some of its points a fit sees the body elsewhere, and turned: by as much as it would
+    /// have seen `last` without them. That is taken away, so that a point that comes or goes moves
+    /// neither the others nor what is told of the global motion.
+    pub fn remove_incomplete(
         &self,
         points: &[[f64; 3]],
-        seen: Option<&[bool]>,
-        lean_rad: f64,
+        seen: &[bool],
+        last: &[[f64; 3]],
         out: &mut [[f64; 3]],
     ) -> GlobalMotion {
-        let (body, home) = self.bodies(points, seen);
-        let mut yaw = self.yaw(points, seen);
-        if self.yaw && lean_rad != 0.0 {
-            yaw = wrap_pi(yaw - lean_rad);
+        let some = Some(seen);
+        let (mut body, mut home) = self.bodies(points, some);
+        let (last_some, _) = self.bodies(last, some);
+        let (last_all, home_all) = self.bodies(last, None);
+        let lean = self.yaw(last, some) - self.yaw(last, None);
+        let yaw = wrap_pi(self.yaw(points, some) - lean);
+        for axis in 0..3 {
+            home[axis] = last_some[axis] - (last_all[axis] - home_all[axis]);
         }
+        self.place(points, (body, home), yaw, out);
+        // From the body of the points that are seen to that of all, back in the tracker's frame.
+        let [x, y, z] = [0, 1, 2].map(|axis| (last_all[axis] - last_some[axis]) / self.scale);
+        let (sin, cos) = yaw.sin_cos();
+        body[0] += x * cos + z * sin;
+        body[1] += y;
+        body[2] += z * cos - x * sin;
+        Self::motion_of(body, home_all, yaw)
+    }
+
+    /// Yaw of the pose against the reference, fitted to the points that are seen, rad; 0 where yaw
+    /// is not removed.
+    fn yaw(&self, points: &[[f64; 3]], seen: Option<&[bool]>) -> f64 {
+        if !self.yaw {
+            return 0.0;
+        }
+        let (body, home) = self.bodies(points, seen);
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for (place, reference, weight) in self.rows(points, seen) {
+            let (px, pz) = (place[0] - body[0], place[2] - body[2]);
+            let (qx, qz) = (reference[0] - home[0], reference[2] - home[2]);
+            sine += weight * (px * qz - pz * qx);
+            cosine += weight * (px * qx + pz * qz);
+        }
+        sine.atan2(cosine)
+    }
+
+    /// Carries the body onto its home, turned back by `yaw`.
+    fn place(
+        &self,
+        points: &[[f64; 3]],
+        (body, home): ([f64; 3], [f64; 3]),
+        yaw: f64,
+        out: &mut [[f64; 3]],
+    ) {
         let (sin, cos) = yaw.sin_cos();
         let scale = self.scale;
         let rise = if self.height {
@@ -237,6 +265,9 @@ impl GlobalFit {
                 x * sin + z * cos + home[2],
             ];
         }
+    }
+
+    fn motion_of(body: [f64; 3], home: [f64; 3], yaw: f64) -> GlobalMotion {
         GlobalMotion {
             yaw_rad: if yaw >= PI { -PI } else { yaw },
             x_m: body[0] - home[0],
