@@ -1,8 +1,10 @@
-//! `handwave gesture`: define gestures, estimate their waves over a recording, check a set.
+//! `handwave gesture`: define gestures, estimate their waves over a recording, check a set, compare estimators.
 
 mod check;
 mod define;
 mod estimate;
+#[cfg(feature = "study")]
+mod study;
 
 use super::{ExitStatus, Failure};
 use crate::gesture::GestureSet;
@@ -75,6 +77,10 @@ own gesture and 0 to all others; above 0.2 the two may be confused.")]
         #[arg(long)]
         json: bool,
     },
+    /// Compare all wave estimators on the same sequences: CSV, plots and a short report.
+    #[cfg(feature = "study")]
+    #[command(after_help = study::EXAMPLES)]
+    Study(study::StudyArgs),
 }
 
 /// Runs `handwave gesture`.
@@ -92,6 +98,8 @@ pub fn run(args: GestureArgs) -> Result<ExitStatus, Failure> {
         } => estimate::estimate(&gestures, &poses, &out, &estimator),
         GestureCommand::List { gestures, json } => check::list(&gestures, json),
         GestureCommand::Check { gestures, json } => check::check(&gestures, json),
+        #[cfg(feature = "study")]
+        GestureCommand::Study(args) => study::study(&args),
     }
 }
 

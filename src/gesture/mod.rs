@@ -11,6 +11,8 @@ mod period;
 mod plane;
 mod separability;
 mod set;
+#[cfg(feature = "study")]
+pub mod study;
 mod wave;
 
 pub use define::{

@@ -1,0 +1,525 @@
+//! Figure 9.15: do gestures that share joints disturb each other? Waves, cross-correlation, SVM.
+
+use super::correlate::{Poses, Template, between};
+use super::metrics::START_AMPLITUDE;
+use super::performer::Performer;
+use super::script::{Curve, Role, Script, rehearse};
+use super::suite::{Row, StudyError, Subject, default_lambda};
+use super::svm::{Lesson, activities};
+use crate::base::random::SplitMix;
+use crate::gesture::{
+    EstimatorKind, FrontEnd, FrontEndError, FrontEndOptions, GestureKind, GestureSet, References,
+};
+use crate::pose::{PoseHeader, PoseSample, Recording};
+
+/// Rate at which the baselines look, as in the thesis.
+const RATE_HZ: f64 = 30.0;
+/// After a change of what is performed, nothing is judged for this long: all methods look back.
+const SETTLING_S: f64 = 1.5;
+/// A lesson of the support vector machine, in seconds.
+const LESSON_S: f64 = 6.0;
+/// Tracker noise in lessons made from reference frames, metres.
+const LESSON_NOISE_M: f64 = 0.0005;
+
+/// How one method sees the gestures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Method {
+    /// Its name.
+    pub name: String,
+    /// Above this the gesture counts as detected.
+    pub threshold: f64,
+    /// Per gesture and time: amplitude, correlation or share of detections.
+    pub activity: Vec<Vec<f64>>,
+}
+
+/// One performance of several gestures and what each method makes of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Independence {
+    /// The sequence's name.
+    pub name: &'static str,
+    /// Names of the gestures.
+    pub gestures: Vec<String>,
+    /// Times in seconds, uniform.
+    pub t: Vec<f64>,
+    /// Per gesture and time whether it is performed.
+    pub performed: Vec<Vec<bool>>,
+    /// The methods.
+    pub methods: Vec<Method>,
+}
+
+impl Independence {
+    /// What is performed at sample `k`: `rest`, a gesture's name, or several joined by `+`.
+    pub fn performed_at(&self, k: usize) -> String {
+        let names: Vec<&str> = (self.gestures.iter().zip(&self.performed))
+            .filter(|(_, performed)| performed[k])
+            .map(|(name, _)| name.as_str())
+            .collect();
+        if names.is_empty() {
+            "rest".into()
+        } else {
+            names.join("+")
+        }
+    }
+
+    /// Every state of the performance once, in the order of its first appearance, with the samples
+    /// that are judged in it: not those just after a change.
+    pub fn states(&self) -> Vec<(String, Vec<usize>)> {
+        let mut states: Vec<(String, Vec<usize>)> = Vec::new();
+        let (mut last, mut since) = (String::new(), f64::NEG_INFINITY);
+        for (k, t) in self.t.iter().enumerate() {
+            let state = self.performed_at(k);
+            if state != last {
+                since = if last.is_empty() { *t - SETTLING_S } else { *t };
+                last.clone_from(&state);
+            }
+            let index = match states.iter().position(|(name, _)| *name == state) {
+                Some(index) => index,
+                None => {
+                    states.push((state, Vec::new()));
+                    states.len() - 1
+                }
+            };
+            if t - since >= SETTLING_S {
+                states[index].1.push(k);
+            }
+        }
+        states
+    }
+
+    /// Adds the mean activity and the share of detections of every method and gesture, state by
+    /// state, to `rows`.
+    pub fn rows(&self, rows: &mut Vec<Row>) {
+        let states = self.states();
+        for method in &self.methods {
+            for (gesture, activity) in self.gestures.iter().zip(&method.activity) {
+                for (state, samples) in &states {
+                    let count = samples.len() as f64;
+                    let mean = samples.iter().map(|k| activity[*k]).sum::<f64>() / count;
+                    let detected = samples
+                        .iter()
+                        .filter(|k| activity[**k] > method.threshold)
+                        .count() as f64;
+                    for (metric, value) in [("mean", mean), ("detected", detected / count)] {
+                        rows.push(Row {
+                            sequence: self.name.into(),
+                            estimator: method.name.clone(),
+                            lambda: default_lambda(),
+                            noise: 0.0,
+                            metric: format!("{metric}_{gesture}_during_{state}"),
+                            value,
+                            unit: "1",
+                        });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Poses without global motion at a uniform 30 Hz, from samples at any times, all points seen.
+fn uniform(references: &References, header: &PoseHeader, samples: Vec<PoseSample>) -> Poses {
+    let recording = Recording {
+        header: header.clone(),
+        samples,
+    };
+    // A point that is never seen stays where it is not: at the origin.
+    let frames = recording.filled().unwrap_or_default();
+    let rows: Vec<Vec<f64>> = frames
+        .iter()
+        .map(|frame| {
+            let mut local = frame.clone();
+            references.fit.remove(frame, None, &mut local);
+            local.as_flattened().to_vec()
+        })
+        .collect();
+    let (from, to) = recording.span_s();
+    let times: Vec<f64> = recording.samples.iter().map(|sample| sample.t).collect();
+    let steps = ((to - from) * RATE_HZ + 1e-6).floor() as usize;
+    let rows = (0..=steps)
+        .map(|k| {
+            let t = from + k as f64 / RATE_HZ;
+            let after = times.partition_point(|time| *time <= t).max(1);
+            let (start, end) = (times[after - 1], times.get(after));
+            let u = end.map_or(0.0, |end| (t - start) / (end - start));
+            between(&rows, (after - 1) as f64 + u)
+        })
+        .collect();
+    Poses {
+        step_s: 1.0 / RATE_HZ,
+        rows,
+    }
+}
+
+/// All methods on one performance of `set`'s gestures.
+fn compare(
+    name: &'static str,
+    set: &GestureSet,
+    recording: &Recording,
+    lessons: &[Lesson],
+    performed: &dyn Fn(f64) -> Vec<bool>,
+    (subjects, seed): (&[Subject], u64),
+) -> Result<Independence, StudyError> {
+    let references = References::new(set).map_err(|anchor| FrontEndError::Anchor { anchor })?;
+    let live = uniform(&references, &recording.header, recording.samples.clone());
+    let (from, _) = recording.span_s();
+    let t: Vec<f64> = (0..live.rows.len())
+        .map(|k| from + k as f64 / RATE_HZ)
+        .collect();
+    let mut methods = Vec::new();
+    for subject in subjects {
+        methods.push(Method {
+            name: format!("waves ({})", subject.name),
+            threshold: START_AMPLITUDE,
+            activity: waves(set, recording, subject.kind, &t)?,
+        });
+    }
+    let matches: Vec<_> = (set.gestures.iter().zip(&references.local))
+        .map(|(gesture, local)| {
+            let rows: Vec<Vec<f64>> = local.iter().map(|row| row.as_slice().to_vec()).collect();
+            let cyclic = gesture.kind == GestureKind::Cyclic;
+            let last = rows.len() as f64 - if cyclic { 0.0 } else { 1.0 };
+            Template::new(gesture.duration_s, cyclic, |u| between(&rows, u * last)).matches(&live)
+        })
+        .collect();
+    for (name, threshold, of) in [
+        (
+            "cross-correlation",
+            0.5,
+            (|m| m.coefficient) as fn(&super::correlate::Match) -> f64,
+        ),
+        ("cross-correlation, size", START_AMPLITUDE, |m| m.amplitude),
+    ] {
+        methods.push(Method {
+            name: name.into(),
+            threshold,
+            activity: matches
+                .iter()
+                .map(|row| row.iter().map(of).collect())
+                .collect(),
+        });
+    }
+    methods.push(Method {
+        name: "svm".into(),
+        threshold: 0.5,
+        activity: activities(lessons, &live, seed)?,
+    });
+    let states: Vec<Vec<bool>> = t.iter().map(|t| performed(*t)).collect();
+    Ok(Independence {
+        name,
+        gestures: set.gestures.iter().map(|g| g.name.clone()).collect(),
+        performed: (0..set.gestures.len())
+            .map(|g| states.iter().map(|state| state[g]).collect())
+            .collect(),
+        t,
+        methods,
+    })
+}
+
+/// The front end's amplitudes at times `t`, per gesture.
+fn waves(
+    set: &GestureSet,
+    recording: &Recording,
+    estimator: EstimatorKind,
+    t: &[f64],
+) -> Result<Vec<Vec<f64>>, FrontEndError> {
+    let options = FrontEndOptions {
+        estimator,
+        lambda: None,
+    };
+    let mut front = FrontEnd::new(set, &recording.header, options)?;
+    let mut activity = vec![Vec::with_capacity(t.len()); set.gestures.len()];
+    let mut next = recording.samples.iter().peekable();
+    for t in t {
+        while let Some(sample) = next.next_if(|sample| sample.t <= t + 1e-9) {
+            // A sample with too few points leaves the last estimates standing.
+            let _refused = front.push(sample).is_err();
+        }
+        for (row, estimate) in activity.iter_mut().zip(front.estimates()) {
+            row.push(estimate.amplitude.abs());
+        }
+    }
+    Ok(activity)
+}
+
+/// From when to when the synthetic hand's thumb, and its whole hand, are performed.
+const THUMB_S: [(f64, f64); 2] = [(3.0, 9.0), (21.0, 27.0)];
+const HAND_S: [(f64, f64); 2] = [(12.0, 18.0), (21.0, 27.0)];
+const HAND_END_S: f64 = 30.0;
+/// Noise on the thumb's plane: that of a good hand tracker.
+const HAND_NOISE: f64 = 0.05;
+
+fn performed_in(spans: &[(f64, f64)], t: f64) -> bool {
+    spans.iter().any(|(from, to)| (*from..*to).contains(&t))
+}
+
+/// A synthetic hand rotates its thumb, then all fingers, then both at once.
+///
+/// The performance is quicker and a little smaller than what was shown; the support vector machine
+/// learns from six seconds of each gesture as shown, and as much rest.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn hand_independence(subjects: &[Subject], seed: u64) -> Result<Independence, StudyError> {
+    let performer = Performer::hand()?;
+    let references =
+        References::new(&performer.set).map_err(|anchor| FrontEndError::Anchor { anchor })?;
+    let burst = |spans: &[(f64, f64)], size: f64| {
+        let mut knots = Vec::new();
+        for (from, to) in spans {
+            knots.extend([
+                (*from, 0.0),
+                (from + 0.3, size),
+                (to - 0.3, size),
+                (*to, 0.0),
+            ]);
+        }
+        Curve(knots)
+    };
+    let record = |script: &Script, seed| {
+        let mut samples = Vec::new();
+        rehearse(&performer, script, seed, |moment| {
+            samples.push(moment.sample.clone());
+        });
+        samples
+    };
+    let mut script = Script::of(
+        Role {
+            amplitude: burst(&THUMB_S, 0.9),
+            frequency_hz: Curve::constant(1.3),
+        },
+        (0.0, HAND_END_S),
+    );
+    script.roles.push(Role {
+        amplitude: burst(&HAND_S, 0.9),
+        frequency_hz: Curve::constant(1.6),
+    });
+    script.noise = HAND_NOISE;
+    script.rate_hz = 60.0;
+    let recording = Recording {
+        header: performer.header.clone(),
+        samples: record(&script, seed),
+    };
+    let lessons: Vec<Lesson> = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
+        .into_iter()
+        .enumerate()
+        .map(|(index, (thumb, hand))| {
+            let mut script = Script::of(Role::steady(thumb, 1.0), (0.0, LESSON_S));
+            script.roles.push(Role::steady(hand, 1.0));
+            script.noise = HAND_NOISE;
+            let samples = record(&script, seed.wrapping_add(1 + index as u64));
+            Lesson {
+                poses: uniform(&references, &performer.header, samples),
+                performed: vec![thumb > 0.0, hand > 0.0],
+            }
+        })
+        .collect();
+    compare(
+        "figure-9.15",
+        &performer.set,
+        &recording,
+        &lessons,
+        &|t| vec![performed_in(&THUMB_S, t), performed_in(&HAND_S, t)],
+        (subjects, seed),
+    )
+}
+
+/// A stretch of a recorded performance whose truth is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Start in seconds.
+    pub from_s: f64,
+    /// End in seconds.
+    pub to_s: f64,
+    /// The gesture performed; `None` for rest.
+    pub gesture: Option<usize>,
+    /// Its size (cyclic gestures).
+    pub amplitude: f64,
+    /// Its frequency in Hz (cyclic gestures).
+    pub frequency_hz: f64,
+}
+
+/// A recorded performance with its gestures and what was performed when.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RealPerformance {
+    /// The gestures.
+    pub set: GestureSet,
+    /// The recording.
+    pub recording: Recording,
+    /// What was performed; stretches in between are not judged.
+    pub parts: Vec<Part>,
+}
+
+/// Rows of the bundled recipe `configs/performances/drum_and_splay.toml`: from, to, what (0 drum,
+/// 1 splay), size, frequency. Joins between segments belong to none.
+const DRUM_AND_SPLAY: [(f64, f64, Option<usize>, f64, f64); 10] = [
+    (0.0, 3.5, None, 0.0, 0.0),
+    (3.5, 11.5, Some(0), 0.7, 0.735 / 1.05),
+    (11.5, 19.5, Some(0), 1.0, 1.0 / 1.05),
+    (19.5, 27.5, Some(0), 0.9, 1.575 / 1.05),
+    (27.5, 33.5, Some(0), 0.7, 1.995 / 1.05),
+    (33.5, 38.0, None, 0.0, 0.0),
+    (38.0, 44.16, Some(1), 1.0, 0.0),
+    (44.16, 46.66, None, 0.0, 0.0),
+    (46.66, 52.66, Some(0), 1.0, 1.155 / 1.05),
+    (52.66, 55.7, None, 0.0, 0.0),
+];
+
+impl RealPerformance {
+    /// The bundled performance: gestures `drum` and `splay`, made by the recipe in
+    /// `configs/performances/drum_and_splay.toml` from recordings of a real hand.
+    pub fn drum_and_splay(set: GestureSet, recording: Recording) -> Self {
+        let parts = DRUM_AND_SPLAY
+            .iter()
+            .map(|(from_s, to_s, gesture, amplitude, frequency_hz)| Part {
+                from_s: *from_s,
+                to_s: *to_s,
+                gesture: *gesture,
+                amplitude: *amplitude,
+                frequency_hz: *frequency_hz,
+            })
+            .collect();
+        Self {
+            set,
+            recording,
+            parts,
+        }
+    }
+
+    fn performed(&self, t: f64) -> Vec<bool> {
+        (0..self.set.gestures.len())
+            .map(|gesture| {
+                self.parts.iter().any(|part| {
+                    part.gesture == Some(gesture) && (part.from_s..part.to_s).contains(&t)
+                })
+            })
+            .collect()
+    }
+
+    /// Adds the errors of the first gesture, and its amplitude when it is not performed, to `rows`.
+    ///
+    /// # Errors
+    /// Recording and gestures that do not fit.
+    pub fn measure(
+        &self,
+        estimator: EstimatorKind,
+        name: &str,
+        rows: &mut Vec<Row>,
+    ) -> Result<(), FrontEndError> {
+        let options = FrontEndOptions {
+            estimator,
+            lambda: None,
+        };
+        let mut front = FrontEnd::new(&self.set, &self.recording.header, options)?;
+        let (mut amplitude, mut frequency) = (Vec::new(), Vec::new());
+        let (mut silent, mut other) = (0.0_f64, 0.0_f64);
+        for sample in &self.recording.samples {
+            if front.push(sample).is_err() {
+                continue;
+            }
+            let estimate = front.estimates()[0];
+            let judged = |part: &&Part| sample.t >= part.from_s + 2.0 && sample.t < part.to_s;
+            match self.parts.iter().find(judged) {
+                Some(part) if part.gesture == Some(0) => {
+                    amplitude.push(estimate.amplitude - part.amplitude);
+                    frequency.push(estimate.frequency_hz - part.frequency_hz);
+                }
+                Some(part) if part.gesture.is_none() => silent = silent.max(estimate.amplitude),
+                Some(_) => other = other.max(estimate.amplitude),
+                None => {}
+            }
+        }
+        for (metric, unit, value) in [
+            (
+                "amplitude_error",
+                "1",
+                super::metrics::rms(amplitude.into_iter()),
+            ),
+            (
+                "frequency_error",
+                "Hz",
+                super::metrics::rms(frequency.into_iter()),
+            ),
+            ("largest_at_rest", "1", silent),
+            ("largest_during_other", "1", other),
+        ] {
+            rows.push(Row {
+                sequence: "recorded-hand".into(),
+                estimator: name.into(),
+                lambda: default_lambda(),
+                noise: 0.0,
+                metric: metric.into(),
+                value,
+                unit,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The same comparison on a recorded performance.
+///
+/// The support vector machine learns from the gestures' own reference frames: a cyclic one repeated,
+/// a non-cyclic one performed and held, and the pose in which each begins as rest.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn real_independence(
+    real: &RealPerformance,
+    subjects: &[Subject],
+    seed: u64,
+) -> Result<Independence, StudyError> {
+    let set = &real.set;
+    let references = References::new(set).map_err(|anchor| FrontEndError::Anchor { anchor })?;
+    let mut random = SplitMix::new(seed);
+    let mut lessons = Vec::new();
+    for (index, gesture) in set.gestures.iter().enumerate() {
+        let rows: Vec<Vec<f64>> = (references.local[index].iter())
+            .map(|row| row.as_slice().to_vec())
+            .collect();
+        let rest = match gesture.kind {
+            GestureKind::Cyclic => references.mean[index].as_slice().to_vec(),
+            GestureKind::NonCyclic => between(&rows, 0.0),
+        };
+        let mut lesson = |at: &dyn Fn(f64) -> Vec<f64>, performed: Vec<bool>| {
+            let rows = (0..(LESSON_S * RATE_HZ) as usize)
+                .map(|k| {
+                    let mut row = at(k as f64 / RATE_HZ);
+                    for value in &mut row {
+                        *value += LESSON_NOISE_M * random.normal();
+                    }
+                    row
+                })
+                .collect();
+            let step_s = 1.0 / RATE_HZ;
+            let poses = Poses { step_s, rows };
+            lessons.push(Lesson { poses, performed });
+        };
+        let only = (0..set.gestures.len())
+            .map(|other| other == index)
+            .collect();
+        let count = rows.len() as f64;
+        match gesture.kind {
+            GestureKind::Cyclic => lesson(
+                &|t| between(&rows, (t / gesture.duration_s).fract() * count),
+                only,
+            ),
+            // There and back at a quarter of the speed, held in between.
+            GestureKind::NonCyclic => lesson(
+                &|t| {
+                    let u = (t.min(LESSON_S - t) / (4.0 * gesture.duration_s)).min(1.0);
+                    between(&rows, u * (count - 1.0))
+                },
+                only,
+            ),
+        }
+        lesson(&|_| rest.clone(), vec![false; set.gestures.len()]);
+    }
+    compare(
+        "recorded-hand",
+        set,
+        &real.recording,
+        &lessons,
+        &|t| real.performed(t),
+        (subjects, seed),
+    )
+}
