@@ -3,7 +3,6 @@
 mod check;
 mod define;
 mod estimate;
-#[cfg(feature = "study")]
 mod study;
 
 use super::{ExitStatus, Failure};
@@ -78,7 +77,6 @@ own gesture and 0 to all others; above 0.2 the two may be confused.")]
         json: bool,
     },
     /// Compare all wave estimators on the same sequences: CSV, plots and a short report.
-    #[cfg(feature = "study")]
     #[command(after_help = study::EXAMPLES)]
     Study(study::StudyArgs),
 }
@@ -98,7 +96,6 @@ pub fn run(args: GestureArgs) -> Result<ExitStatus, Failure> {
         } => estimate::estimate(&gestures, &poses, &out, &estimator),
         GestureCommand::List { gestures, json } => check::list(&gestures, json),
         GestureCommand::Check { gestures, json } => check::check(&gestures, json),
-        #[cfg(feature = "study")]
         GestureCommand::Study(args) => study::study(&args),
     }
 }

@@ -11,7 +11,6 @@ mod period;
 mod plane;
 mod separability;
 mod set;
-#[cfg(feature = "study")]
 pub mod study;
 mod wave;
 

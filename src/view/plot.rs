@@ -28,6 +28,9 @@ const CHARACTER: f64 = 0.47;
 /// Height of a row of the legend, and of a figure's title, in pixels.
 const LEGEND_ROW: u32 = 24;
 const TITLE_ROW: u32 = 34;
+/// Height of a panel's title, and width of the numbers and the label on its left, in pixels.
+const CAPTION: u32 = 30;
+const LEFT: u32 = 66;
 
 /// How a series is drawn.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -92,6 +95,23 @@ impl Axis {
             log: true,
             ..Self::linear(label, from, to)
         }
+    }
+
+    /// Where a logarithmic axis has lines: at 1, 2 and 5 of every decade, only at 1 over more than
+    /// two decades.
+    fn log_ticks(&self) -> Vec<f64> {
+        if !self.log {
+            return Vec::new();
+        }
+        let (from, to) = self.range;
+        let (first, last) = (from.log10().floor() as i32, to.log10().ceil() as i32);
+        let shares: &[u32] = if to > 100.0 * from { &[1] } else { &[1, 2, 5] };
+        (first..=last)
+            .flat_map(|decade| shares.iter().map(move |share| (decade, share)))
+            // Read from text, so that it prints as written.
+            .filter_map(|(decade, share)| format!("{share}e{decade}").parse().ok())
+            .filter(|value| (from..=to).contains(value))
+            .collect()
     }
 
     /// An axis with names in place of numbers.
@@ -293,9 +313,9 @@ where
     let mut chart = ChartBuilder::on(area)
         .margin(8)
         .margin_right(18)
-        .caption(&panel.title, ("sans-serif", LABEL + 1))
+        .margin_top(CAPTION)
         .x_label_area_size(44)
-        .y_label_area_size(66)
+        .y_label_area_size(LEFT)
         .build_cartesian_2d(x, y)?;
     let (bottom, top) = panel.y.range;
     for span in &panel.spans {
@@ -303,14 +323,13 @@ where
         let corners = [(span.x.0, bottom), (span.x.1, top)];
         chart.draw_series(std::iter::once(Rectangle::new(corners, ink)))?;
     }
+    let title = Text::new(panel.title.clone(), (LEFT as i32 + 9, 8), font());
+    area.draw(&title)?;
     let named = !panel.x.names.is_empty();
     let grey = RGBColor(225, 225, 225);
     let numbers = |axis: &Axis| {
         let decimals = decimals(axis);
-        move |value: &f64| match decimals {
-            Some(decimals) => format!("{value:.decimals$}"),
-            None => format!("{value}"),
-        }
+        move |value: &f64| format!("{value:.decimals$}")
     };
     let (x_numbers, y_numbers) = (numbers(&panel.x), numbers(&panel.y));
     let mut mesh = chart.configure_mesh();
@@ -320,14 +339,35 @@ where
         .axis_desc_style(font())
         .x_label_formatter(&x_numbers)
         .y_label_formatter(&y_numbers)
-        .x_labels(if named { 0 } else { 8 })
-        .y_labels(6)
+        .x_labels(if named || panel.x.log { 0 } else { 8 })
+        .y_labels(if panel.y.log { 0 } else { 6 })
         .x_desc(&panel.x.label)
         .y_desc(&panel.y.label);
     if named {
         mesh.disable_x_mesh();
     }
     mesh.draw()?;
+    let corner = area.get_base_pixel();
+    // `backend_coord` counts from the figure's corner, drawing from the area's.
+    let place = |(x, y): (i32, i32)| (x - corner.0, y - corner.1);
+    for (axis, across) in [(&panel.x, false), (&panel.y, true)] {
+        for value in axis.log_ticks() {
+            let ends = if across {
+                [(panel.x.range.0, value), (panel.x.range.1, value)]
+            } else {
+                [(value, bottom), (value, top)]
+            };
+            chart.draw_series(std::iter::once(PathElement::new(ends.to_vec(), grey)))?;
+            let (x, y) = place(chart.backend_coord(&ends[0]));
+            let (at, pos) = if across {
+                ((x - 7, y), Pos::new(HPos::Right, VPos::Center))
+            } else {
+                ((x, y + 8), Pos::new(HPos::Center, VPos::Top))
+            };
+            let style = TextStyle::from(font()).pos(pos);
+            area.draw(&Text::new(format!("{value}"), at, style))?;
+        }
+    }
     for series in &panel.series {
         let ink = color(series.color);
         match series.style {
@@ -356,20 +396,17 @@ where
     if named {
         let centred = TextStyle::from(font()).pos(Pos::new(HPos::Center, VPos::Top));
         for (index, name) in panel.x.names.iter().enumerate() {
-            let (x, y) = chart.backend_coord(&(index as f64, bottom));
-            // `backend_coord` counts from the figure's corner, drawing from the area's.
-            let corner = area.get_base_pixel();
-            let place = (x - corner.0, y - corner.1 + 7);
-            area.draw(&Text::new(name.clone(), place, centred.clone()))?;
+            let (x, y) = place(chart.backend_coord(&(index as f64, bottom)));
+            area.draw(&Text::new(name.clone(), (x, y + 7), centred.clone()))?;
         }
     }
     Ok(())
 }
 
-/// Decimals that tell the numbers along a linear axis apart; logarithmic numbers print as they are.
-fn decimals(axis: &Axis) -> Option<usize> {
+/// Decimals that tell the numbers along a linear axis apart.
+fn decimals(axis: &Axis) -> usize {
     let extent = axis.range.1 - axis.range.0;
-    (!axis.log).then(|| (0.7 - extent.log10()).ceil().clamp(0.0, 6.0) as usize)
+    (0.7 - extent.log10()).ceil().clamp(0.0, 6.0) as usize
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! `handwave gesture study`: all wave estimators on the same sequences; CSV, plots, a short report.
 
+#[cfg(feature = "plot")]
 mod plots;
 mod report;
 mod table;
@@ -8,7 +9,9 @@ use crate::base::suggest;
 use crate::cli::{ExitStatus, Failure, say, warn};
 use crate::config::Files;
 use crate::gesture::GestureSet;
-use crate::gesture::study::{RealPerformance, Row, StudyOptions, Subject, study as run_study};
+use crate::gesture::study::{
+    RealPerformance, Row, Study, StudyOptions, Subject, study as run_study,
+};
 use crate::pose::{PoseFormat, PoseReader, Recording};
 use clap::Args;
 use std::io::Write;
@@ -72,12 +75,8 @@ pub(super) fn study(args: &StudyArgs) -> Result<ExitStatus, Failure> {
     };
     let study = run_study(&options, &mut progress).map_err(Failure::input)?;
     write(&csv, &csv_text(&study.rows))?;
-    let figures = plots::figures(&study, &options.subjects);
-    for (name, figure) in &figures {
-        let text = figure.svg().map_err(Failure::input)?;
-        write(&args.out.join(name), &text)?;
-    }
-    let report = report::report(&study, &options, figures.iter().map(|(name, _)| *name));
+    let plots = draw(&study, &options.subjects, &args.out)?;
+    let report = report::report(&study, &options, &plots);
     write(&args.out.join("report.md"), &report)?;
     if args.json {
         for row in &study.rows {
@@ -98,6 +97,27 @@ pub(super) fn study(args: &StudyArgs) -> Result<ExitStatus, Failure> {
         ));
     }
     Ok(ExitStatus::Done)
+}
+
+/// Writes the plots; returns their file names.
+#[cfg(feature = "plot")]
+fn draw(study: &Study, subjects: &[Subject], out: &Path) -> Result<Vec<&'static str>, Failure> {
+    let mut names = Vec::new();
+    for (name, figure) in plots::figures(study, subjects) {
+        let text = figure.svg().map_err(Failure::input)?;
+        write(&out.join(name), &text)?;
+        names.push(name);
+    }
+    Ok(names)
+}
+
+/// This build draws none.
+#[cfg(not(feature = "plot"))]
+fn draw(_: &Study, _: &[Subject], _: &Path) -> Result<Vec<&'static str>, Failure> {
+    warn(format_args!(
+        "no plots: this build lacks the feature `plot`"
+    ));
+    Ok(Vec::new())
 }
 
 /// The estimators asked for, each once, in the order of the list of all.

@@ -13,9 +13,9 @@ pub struct Poses {
 }
 
 /// Frames of a template, and phases that are tried.
-const FRAMES: usize = 12;
+const FRAMES: usize = 10;
 /// Time scales that are tried: window length over the template's.
-const SCALES: [f64; 6] = [0.5, 0.67, 0.8, 1.0, 1.25, 1.6];
+const SCALES: [f64; 5] = [0.5, 0.62, 0.77, 1.0, 1.3];
 /// A motion smaller than this share of the template is no motion: its correlation means nothing.
 const LEAST_SIZE: f64 = 0.2;
 

@@ -1,7 +1,7 @@
 //! Figure 9.15: do gestures that share joints disturb each other? Waves, cross-correlation, SVM.
 
 use super::correlate::{Poses, Template, between};
-use super::metrics::START_AMPLITUDE;
+use super::metrics::{START_AMPLITUDE, rms};
 use super::performer::Performer;
 use super::script::{Curve, Role, Script, rehearse};
 use super::suite::{Row, StudyError, Subject, default_lambda};
@@ -30,6 +30,8 @@ pub struct Method {
     pub threshold: f64,
     /// Per gesture and time: amplitude, correlation or share of detections.
     pub activity: Vec<Vec<f64>>,
+    /// Per gesture and time the frequency in Hz; empty for methods that tell none.
+    pub frequency_hz: Vec<Vec<f64>>,
 }
 
 /// One performance of several gestures and what each method makes of it.
@@ -157,7 +159,7 @@ fn compare(
     recording: &Recording,
     lessons: &[Lesson],
     performed: &dyn Fn(f64) -> Vec<bool>,
-    (subjects, seed): (&[Subject], u64),
+    subjects: &[Subject],
 ) -> Result<Independence, StudyError> {
     let references = References::new(set).map_err(|anchor| FrontEndError::Anchor { anchor })?;
     let live = uniform(&references, &recording.header, recording.samples.clone());
@@ -167,10 +169,12 @@ fn compare(
         .collect();
     let mut methods = Vec::new();
     for subject in subjects {
+        let (activity, frequency_hz) = waves(set, recording, subject.kind, &t)?;
         methods.push(Method {
-            name: format!("waves ({})", subject.name),
+            name: wave_method(subject.name),
             threshold: START_AMPLITUDE,
-            activity: waves(set, recording, subject.kind, &t)?,
+            activity,
+            frequency_hz,
         });
     }
     let matches: Vec<_> = (set.gestures.iter().zip(&references.local))
@@ -196,12 +200,14 @@ fn compare(
                 .iter()
                 .map(|row| row.iter().map(of).collect())
                 .collect(),
+            frequency_hz: Vec::new(),
         });
     }
     methods.push(Method {
         name: "svm".into(),
         threshold: 0.5,
-        activity: activities(lessons, &live, seed)?,
+        activity: activities(lessons, &live)?,
+        frequency_hz: Vec::new(),
     });
     let states: Vec<Vec<bool>> = t.iter().map(|t| performed(*t)).collect();
     Ok(Independence {
@@ -215,30 +221,40 @@ fn compare(
     })
 }
 
-/// The front end's amplitudes at times `t`, per gesture.
+/// Name of the method that reads waves with an estimator.
+pub fn wave_method(estimator: &str) -> String {
+    format!("waves ({estimator})")
+}
+
+/// Per gesture a value over time.
+type PerGesture = Vec<Vec<f64>>;
+
+/// The front end's amplitudes and frequencies at times `t`.
 fn waves(
     set: &GestureSet,
     recording: &Recording,
     estimator: EstimatorKind,
     t: &[f64],
-) -> Result<Vec<Vec<f64>>, FrontEndError> {
+) -> Result<(PerGesture, PerGesture), FrontEndError> {
     let options = FrontEndOptions {
         estimator,
         lambda: None,
     };
     let mut front = FrontEnd::new(set, &recording.header, options)?;
-    let mut activity = vec![Vec::with_capacity(t.len()); set.gestures.len()];
+    let mut amplitude = vec![Vec::with_capacity(t.len()); set.gestures.len()];
+    let mut frequency = amplitude.clone();
     let mut next = recording.samples.iter().peekable();
     for t in t {
         while let Some(sample) = next.next_if(|sample| sample.t <= t + 1e-9) {
             // A sample with too few points leaves the last estimates standing.
             let _refused = front.push(sample).is_err();
         }
-        for (row, estimate) in activity.iter_mut().zip(front.estimates()) {
-            row.push(estimate.amplitude.abs());
+        for (index, estimate) in front.estimates().iter().enumerate() {
+            amplitude[index].push(estimate.amplitude.abs());
+            frequency[index].push(estimate.frequency_hz);
         }
     }
-    Ok(activity)
+    Ok((amplitude, frequency))
 }
 
 /// From when to when the synthetic hand's thumb, and its whole hand, are performed.
@@ -319,7 +335,7 @@ pub fn hand_independence(subjects: &[Subject], seed: u64) -> Result<Independence
         &recording,
         &lessons,
         &|t| vec![performed_in(&THUMB_S, t), performed_in(&HAND_S, t)],
-        (subjects, seed),
+        subjects,
     )
 }
 
@@ -395,64 +411,53 @@ impl RealPerformance {
             .collect()
     }
 
-    /// Adds the errors of the first gesture, and its amplitude when it is not performed, to `rows`.
-    ///
-    /// # Errors
-    /// Recording and gestures that do not fit.
-    pub fn measure(
-        &self,
-        estimator: EstimatorKind,
-        name: &str,
-        rows: &mut Vec<Row>,
-    ) -> Result<(), FrontEndError> {
-        let options = FrontEndOptions {
-            estimator,
-            lambda: None,
-        };
-        let mut front = FrontEnd::new(&self.set, &self.recording.header, options)?;
-        let (mut amplitude, mut frequency) = (Vec::new(), Vec::new());
-        let (mut silent, mut other) = (0.0_f64, 0.0_f64);
-        for sample in &self.recording.samples {
-            if front.push(sample).is_err() {
+    /// The performance with only every `step`-th sample, for a quick look.
+    pub fn thinned(mut self, step: usize) -> Self {
+        let samples = std::mem::take(&mut self.recording.samples);
+        self.recording.samples = samples.into_iter().step_by(step.max(1)).collect();
+        self
+    }
+
+    /// Adds the errors of the first gesture as read in `seen`, and its amplitude when it is not
+    /// performed, to `rows`.
+    pub fn measure(&self, seen: &Independence, subjects: &[Subject], rows: &mut Vec<Row>) {
+        for subject in subjects {
+            let name = wave_method(subject.name);
+            let Some(method) = seen.methods.iter().find(|method| method.name == name) else {
                 continue;
-            }
-            let estimate = front.estimates()[0];
-            let judged = |part: &&Part| sample.t >= part.from_s + 2.0 && sample.t < part.to_s;
-            match self.parts.iter().find(judged) {
-                Some(part) if part.gesture == Some(0) => {
-                    amplitude.push(estimate.amplitude - part.amplitude);
-                    frequency.push(estimate.frequency_hz - part.frequency_hz);
+            };
+            let (mut amplitude, mut frequency) = (Vec::new(), Vec::new());
+            let (mut silent, mut other) = (0.0_f64, 0.0_f64);
+            for (k, t) in seen.t.iter().enumerate() {
+                let judged = |part: &&Part| *t >= part.from_s + 2.0 && *t < part.to_s;
+                let (size, hz) = (method.activity[0][k], method.frequency_hz[0][k]);
+                match self.parts.iter().find(judged) {
+                    Some(part) if part.gesture == Some(0) => {
+                        amplitude.push(size - part.amplitude);
+                        frequency.push(hz - part.frequency_hz);
+                    }
+                    Some(part) if part.gesture.is_none() => silent = silent.max(size),
+                    Some(_) => other = other.max(size),
+                    None => {}
                 }
-                Some(part) if part.gesture.is_none() => silent = silent.max(estimate.amplitude),
-                Some(_) => other = other.max(estimate.amplitude),
-                None => {}
+            }
+            for (metric, unit, value) in [
+                ("amplitude_error", "1", rms(amplitude.into_iter())),
+                ("frequency_error", "Hz", rms(frequency.into_iter())),
+                ("largest_at_rest", "1", silent),
+                ("largest_during_other", "1", other),
+            ] {
+                rows.push(Row {
+                    sequence: seen.name.into(),
+                    estimator: subject.name.into(),
+                    lambda: default_lambda(),
+                    noise: 0.0,
+                    metric: metric.into(),
+                    value,
+                    unit,
+                });
             }
         }
-        for (metric, unit, value) in [
-            (
-                "amplitude_error",
-                "1",
-                super::metrics::rms(amplitude.into_iter()),
-            ),
-            (
-                "frequency_error",
-                "Hz",
-                super::metrics::rms(frequency.into_iter()),
-            ),
-            ("largest_at_rest", "1", silent),
-            ("largest_during_other", "1", other),
-        ] {
-            rows.push(Row {
-                sequence: "recorded-hand".into(),
-                estimator: name.into(),
-                lambda: default_lambda(),
-                noise: 0.0,
-                metric: metric.into(),
-                value,
-                unit,
-            });
-        }
-        Ok(())
     }
 }
 
@@ -520,6 +525,6 @@ pub fn real_independence(
         &real.recording,
         &lessons,
         &|t| real.performed(t),
-        (subjects, seed),
+        subjects,
     )
 }

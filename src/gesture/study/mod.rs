@@ -15,7 +15,7 @@ mod suite;
 mod svm;
 
 pub use correlate::{Match, Poses, Template};
-pub use independence::{Independence, Method, Part, RealPerformance};
+pub use independence::{Independence, Method, Part, RealPerformance, wave_method};
 pub use metrics::{
     ABORT_AMPLITUDE, START_AMPLITUDE, activations, best_lag, median, reaching_s, rms,
     rms_phase_deg, settling_s, share_above,

@@ -4,7 +4,7 @@ use crate::base::angle::wrap_pi;
 use crate::base::random::SplitMix;
 use crate::gesture::{CyclicMarks, DefineError, GestureSet, Plane, References, define_cyclic};
 use crate::pose::{PoseHeader, PoseSample, Recording};
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
 /// Rate and length of the clean recording that gestures are defined from.
@@ -37,14 +37,9 @@ pub struct Doing {
     pub offset: f64,
 }
 
-/// How white noise on the points reaches one gesture's plane.
-#[derive(Clone, Debug)]
-struct NoiseMap {
-    /// Plane components by coordinates (2 x 3V), at the rest pose, global motion removed.
-    jacobian: DMatrix<f64>,
-    /// Eigenvectors of J J^T with their eigenvalues, blind ones left out.
-    axes: Vec<(Vector2<f64>, f64)>,
-}
+/// How white noise on the points reaches one gesture's plane: along each axis of the noise there,
+/// what every coordinate does to it, and the sum of squares of that. Blind axes are left out.
+type NoiseMap = Vec<(Vec<f64>, f64)>;
 
 /// A body of points that performs gestures; knows what its planes should read.
 #[derive(Clone, Debug)]
@@ -206,31 +201,34 @@ impl Performer {
             sum[0] += re * cos + im * sin;
             sum[1] += im * cos - re * sin;
         }
-        let mut jacobian = DMatrix::zeros(2, 3 * self.rest.len());
+        // What a small step of every coordinate does to the plane.
+        let mut columns = Vec::new();
         let mut points = self.rest.clone();
-        for column in 0..3 * self.rest.len() {
+        for index in 0..3 * self.rest.len() {
             let mut at = |step: f64| {
-                points.as_flattened_mut()[column] += step;
-                let z = read(&points);
-                points.as_flattened_mut()[column] -= step;
-                z
+                points.as_flattened_mut()[index] += step;
+                let [re, im] = read(&points);
+                points.as_flattened_mut()[index] -= step;
+                Vector2::new(re, im)
             };
-            let (ahead, behind) = (at(STEP_M), at(-STEP_M));
-            for component in 0..2 {
-                jacobian[(component, column)] =
-                    (ahead[component] - behind[component]) / (2.0 * STEP_M);
-            }
+            columns.push((at(STEP_M) - at(-STEP_M)) / (2.0 * STEP_M));
         }
-        let gram = &jacobian * jacobian.transpose();
-        let gram = Matrix2::new(gram[(0, 0)], gram[(0, 1)], gram[(1, 0)], gram[(1, 1)]);
+        let gram: Matrix2<f64> = columns
+            .iter()
+            .map(|column| column * column.transpose())
+            .sum();
         let eigen = gram.symmetric_eigen();
         let largest = eigen.eigenvalues.max();
         let axes = (0..2)
             .filter(|k| eigen.eigenvalues[*k] > BLIND * largest)
-            .map(|k| (eigen.eigenvectors.column(k).into(), eigen.eigenvalues[k]))
+            .map(|k| {
+                let axis = eigen.eigenvectors.column(k);
+                let row = columns.iter().map(|column| column.dot(&axis)).collect();
+                (row, eigen.eigenvalues[k])
+            })
             .collect();
         self.phase_offsets_rad.push(sum[1].atan2(sum[0]));
-        self.noise.push(NoiseMap { jacobian, axes });
+        self.noise.push(axes);
     }
 
     /// An empty sample with room for all points.
@@ -277,20 +275,26 @@ impl Performer {
         let Some(map) = self.noise.get(index).filter(|_| deviation > 0.0) else {
             return;
         };
-        let largest = map.axes.iter().map(|(_, value)| *value).fold(0.0, f64::max);
+        let largest = map.iter().map(|(_, square)| *square).fold(0.0, f64::max);
         if largest <= 0.0 {
             return;
         }
         let per_coordinate = deviation / largest.sqrt();
-        let mut shift =
-            DVector::from_fn(3 * self.rest.len(), |_, _| per_coordinate * random.normal());
-        for (axis, value) in &map.axes {
-            // The row of the plane along this axis: orthogonal to the other's.
-            let row = map.jacobian.transpose() * axis;
-            let missing = deviation * random.normal() - row.dot(&shift);
-            shift += row * (missing / value);
+        let mut shifts: Vec<f64> = (0..3 * self.rest.len())
+            .map(|_| per_coordinate * random.normal())
+            .collect();
+        for (row, square) in map {
+            let seen: f64 = row
+                .iter()
+                .zip(&shifts)
+                .map(|(row, shift)| row * shift)
+                .sum();
+            let gain = (deviation * random.normal() - seen) / square;
+            for (shift, row) in shifts.iter_mut().zip(row) {
+                *shift += gain * row;
+            }
         }
-        for (point, shift) in sample.points.iter_mut().zip(shift.as_slice().chunks(3)) {
+        for (point, shift) in sample.points.iter_mut().zip(shifts.chunks(3)) {
             if let Some(place) = point {
                 for (value, shift) in place.iter_mut().zip(shift) {
                     *value += shift;

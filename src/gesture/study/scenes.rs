@@ -292,9 +292,14 @@ pub fn steps(cast: Cast, before_s: f64) -> [Scene; 2] {
     ]
 }
 
+/// How long everything is steady before an event, in seconds.
+pub fn before_s(quick: bool) -> f64 {
+    if quick { 3.0 } else { 6.0 }
+}
+
 /// All sequences at full length, or a short selection of each for a quick look.
 pub fn scenes(quick: bool) -> Vec<Scene> {
-    let before = if quick { 4.0 } else { 6.0 };
+    let before = before_s(quick);
     let mut scenes = Vec::from(steps(Cast::Loop, before));
     scenes.extend(steps(Cast::Line, before));
     let simple = |name, cast, script, noises: &[f64], measure: fn(&Trace) -> Vec<Measure>| Scene {
@@ -313,7 +318,7 @@ pub fn scenes(quick: bool) -> Vec<Scene> {
         &[0.01, 0.03, 0.05, 0.1, 0.15, 0.2, 0.3],
         steady,
     ));
-    let minutes = if quick { 0.5 } else { 10.0 };
+    let minutes = if quick { 0.25 } else { 10.0 };
     for (name, rate_hz) in [("pure-noise-60hz", 60.0), ("pure-noise-30hz", 30.0)] {
         let mut script = Script::of(Role::silent(), (-6.0, 60.0 * minutes));
         script.rate_hz = rate_hz;

@@ -3,7 +3,7 @@
 use super::independence::{Independence, RealPerformance, hand_independence, real_independence};
 use super::metrics::{median, rms, rms_phase_deg};
 use super::performer::Performer;
-use super::scenes::{Cast, Scene, figure_9_5, scenes, steps};
+use super::scenes::{Cast, Scene, before_s, figure_9_5, scenes, steps};
 use super::script::{Player, Trace, rehearse};
 use crate::gesture::{DefineError, EstimatorKind, FrontEndError};
 
@@ -78,9 +78,16 @@ pub enum StudyError {
     /// Gestures and stream do not fit.
     #[error(transparent)]
     FrontEnd(#[from] FrontEndError),
-    /// The support vector machine failed.
-    #[error("the support vector machine cannot be trained: {0}")]
-    Svm(String),
+    /// A support vector machine needs examples of what it looks for and of something else.
+    #[error(
+        "the support vector machine cannot be trained: {of_class} of {samples} samples are of its class; it needs some, and some others"
+    )]
+    OneClass {
+        /// Samples in all.
+        samples: usize,
+        /// Samples of the class.
+        of_class: usize,
+    },
 }
 
 /// The whole study.
@@ -187,12 +194,10 @@ pub fn study(
         .independence
         .push(hand_independence(&options.subjects, options.seed)?);
     if let Some(real) = &options.real {
-        for (subject, name) in (options.subjects.iter()).map(|s| (s, s.name)) {
-            real.measure(subject.kind, name, &mut result.rows)?;
-        }
-        result
-            .independence
-            .push(real_independence(real, &options.subjects, options.seed)?);
+        let real = real.clone().thinned(if options.quick { 3 } else { 1 });
+        let seen = real_independence(&real, &options.subjects, options.seed)?;
+        real.measure(&seen, &options.subjects, &mut result.rows);
+        result.independence.push(seen);
     }
     for independence in &result.independence {
         independence.rows(&mut result.rows);
@@ -218,7 +223,7 @@ impl Performers {
 
 /// The steps once more, at the noise at which windows are compared.
 fn trade_scenes(quick: bool) -> [Scene; 2] {
-    steps(Cast::Loop, if quick { 4.0 } else { 6.0 }).map(|mut scene| {
+    steps(Cast::Loop, before_s(quick)).map(|mut scene| {
         scene.noises = vec![TRADE_NOISE];
         scene.repeats = if quick { 1 } else { scene.repeats };
         scene

@@ -171,8 +171,7 @@ impl FastEstimator {
             }
         } else if since_s < period {
             // While the window is short the frequency may still be far off.
-            if let Some(better) = self.search(&lock, &fit.wave, t, &NEAR)
-            {
+            if let Some(better) = self.search(&lock, &fit.wave, t, &NEAR) {
                 fit = better;
             }
         }
@@ -264,7 +263,9 @@ impl FastEstimator {
             });
             if !taken
                 && let Some((lock, fit)) = self.seed(&candidate, t)
-                && held.as_ref().is_none_or(|(_, old)| fit.evidence() > old.evidence() + 2.0)
+                && held
+                    .as_ref()
+                    .is_none_or(|(_, old)| fit.evidence() > old.evidence() + 2.0)
             {
                 held = Some((lock, fit));
             }
@@ -284,7 +285,11 @@ impl FastEstimator {
         if since_s * hz.abs() > 0.8 {
             let pace = (periods / lock.learnt.clamp(0.3, 2.0)).min(1.0);
             let (left, _) = self.recent(&fit.wave, since_s);
-            let left = left.min(if lock.learnt > 0.5 { 3.0 * lock.noise + 1e-6 } else { f64::INFINITY });
+            let left = left.min(if lock.learnt > 0.5 {
+                3.0 * lock.noise + 1e-6
+            } else {
+                f64::INFINITY
+            });
             lock.noise += pace * (left - lock.noise);
             lock.learnt += periods;
             let centre = lock.centre.get_or_insert(fit.wave.c);
@@ -326,7 +331,8 @@ impl FastEstimator {
             wrap_tau(predicted)
         } else {
             let limit = FASTEST_CORRECTION * dt;
-            let mut correction = (follow(PHASE_S) * wrap_pi(raw.phase_rad - predicted)).clamp(-limit, limit);
+            let mut correction =
+                (follow(PHASE_S) * wrap_pi(raw.phase_rad - predicted)).clamp(-limit, limit);
             if correction * advance < 0.0 {
                 let most = 0.9 * advance.abs();
                 correction = correction.clamp(-most, most);

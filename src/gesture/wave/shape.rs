@@ -39,7 +39,11 @@ impl Shape {
             backward += z * turn / n;
         }
         let shape = Self { forward, backward };
-        if shape.power() > 0.01 { shape } else { Self::LOOP }
+        if shape.power() > 0.01 {
+            shape
+        } else {
+            Self::LOOP
+        }
     }
 
     /// `|forward|^2 + |backward|^2`: mean square modulus at amplitude 1.

@@ -3,7 +3,7 @@
 use super::table::label;
 use crate::base::angle::wrap_pi;
 use crate::gesture::study::{
-    Independence, STEP_NOISES, Study, Subject, TRADE_NOISE, Trace, default_lambda,
+    Independence, STEP_NOISES, Study, Subject, TRADE_NOISE, Trace, default_lambda, wave_method,
 };
 use crate::view::plot::{Axis, Figure, Panel, Series, Span, Style};
 
@@ -387,7 +387,7 @@ fn activities(independence: &Independence, title: &str, subjects: &[Subject]) ->
             .filter_map(|(method, name, color)| line(method, name, color))
             .collect();
             for subject in &shown {
-                let method = format!("waves ({})", subject.name);
+                let method = wave_method(subject.name);
                 let name = format!("waves, {} [amplitude]", label(*subject));
                 series.extend(line(&method, &name, color(*subject)));
             }

@@ -4,11 +4,7 @@ use super::table::{cell, label, markdown, summary};
 use crate::gesture::study::{Independence, SIGNAL_TO_NOISE, Study, StudyOptions, Subject};
 
 /// Text of `report.md`, next to the plots named `plots`.
-pub(super) fn report<'a>(
-    study: &Study,
-    options: &StudyOptions,
-    plots: impl Iterator<Item = &'a str>,
-) -> String {
+pub(super) fn report(study: &Study, options: &StudyOptions, plots: &[&str]) -> String {
     let mut text = String::from("# Wave estimators compared\n\n");
     text.push_str(
         "All estimators read the same synthetic performers through the whole front end, each with its own \
@@ -35,7 +31,9 @@ pub(super) fn report<'a>(
     for independence in &study.independence {
         text.push_str(&confusion(independence));
     }
-    text.push_str("\n## Plots\n\n");
+    if !plots.is_empty() {
+        text.push_str("\n## Plots\n\n");
+    }
     for plot in plots {
         text.push_str(&format!("![{}]({plot})\n\n", caption(plot)));
     }
