@@ -168,18 +168,21 @@ impl FrontEnd {
         references.fit.remove(&set.reference, None, &mut home);
         let mut channel_names: Vec<String> = GLOBAL_CHANNELS.map(String::from).to_vec();
         channel_names.extend(stream.channels.iter().cloned());
+        let planes: Vec<Plane> = (0..set.gestures.len())
+            .map(|index| Plane::train(set, &references, index))
+            .collect();
         Ok(Self {
             columns: set.header.points.iter().filter_map(find).collect(),
             stream_points: stream.points.len(),
-            planes: (0..set.gestures.len())
-                .map(|index| Plane::train(set, &references, index))
-                .collect(),
             fit: references.fit,
             readings: set
                 .gestures
                 .iter()
-                .map(|gesture| match gesture.kind {
-                    GestureKind::Cyclic => Reading::Wave(options.estimator.build(&settings)),
+                .zip(&planes)
+                .map(|(gesture, plane)| match gesture.kind {
+                    GestureKind::Cyclic => {
+                        Reading::Wave(options.estimator.build(&settings, plane.shape()))
+                    }
                     GestureKind::NonCyclic => Reading::Progression(ProgressionSmoother::new(
                         settings.progression_smoothing_s,
                     )),
@@ -190,6 +193,7 @@ impl FrontEnd {
                 .iter()
                 .map(|gesture| silent(gesture.kind))
                 .collect(),
+            planes,
             with_variance: settings.under_constrained,
             places: vec![[0.0; 3]; points],
             seen: vec![false; points],

@@ -23,4 +23,7 @@ pub use period::{PeriodEstimate, find_period};
 pub use plane::{Plane, References};
 pub use separability::{Response, responses};
 pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
-pub use wave::{Estimator, EstimatorKind, GaborEstimator, LONGEST_GAP_S, PlanePoint, WaveEstimate};
+pub use wave::{
+    CorrelationEstimator, DirectEstimator, Estimator, EstimatorKind, FastEstimator, GaborEstimator,
+    LONGEST_GAP_S, LeastSquaresEstimator, PlanePoint, Shape, WaveEstimate,
+};

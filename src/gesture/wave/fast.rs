@@ -37,8 +37,12 @@ struct Lock {
     centre: Option<C>,
     /// Amplitude before the last cut.
     size: f64,
-    /// Angular frequency before the last cut.
-    before: f64,
+    /// The wave before the last cut, carried on to now.
+    before: Wave,
+    /// Share of the amplitude that is believed.
+    share: f64,
+    /// How long a bank has known better; beyond 1 it is believed.
+    doubt: f64,
 }
 
 /// Locked wave fit with change detection.
@@ -118,6 +122,13 @@ impl FastEstimator {
         (sum / f64::max(count, 1.0), count)
     }
 
+    /// Share of a first amplitude that is believed after so many periods: a line must have been there and
+    /// back, a loop shows itself earlier.
+    fn seen(&self, periods: f64) -> f64 {
+        let least = 0.6 - 0.25 * self.shape.roundness();
+        ((periods - least) / 0.25).clamp(0.0, 1.0)
+    }
+
     /// What is believed of a locked wave: centre and figure stay, of the frequency `omega`.
     fn prior(&self, lock: &Lock, omega: f64) -> Prior {
         let size = lock.size.max(0.05);
@@ -130,7 +141,9 @@ impl FastEstimator {
     }
 
     fn variance(&self, lock: &Lock) -> f64 {
-        0.5 * lock.noise + (FLOOR * lock.size).powi(2)
+        // On a line nearly all noise lies in the one component that the pose tells.
+        let lean = 1.0 - 0.5 * self.shape.roundness();
+        lean * lock.noise + (FLOOR * lock.size).powi(2)
     }
 
     /// Fits the lock's wave to now; cuts the past off where it no longer fits.
@@ -146,42 +159,70 @@ impl FastEstimator {
         let mut fit = self
             .task(start.omega, since_s, variance, prior)
             .step(&start, true)?;
-        let period = TAU / fit.wave.omega.abs();
+        lock.before = lock.before.ahead(dt);
+        let period = TAU / start.omega.abs();
+        let short = since_s < SHORT * period;
         let (left, count) = self.recent(&fit.wave, since_s);
         let usual = lock.noise + (FLOOR * lock.size).powi(2);
         let surprised = left > (1.0 + SURPRISE / count.sqrt()) * usual;
-        if surprised && since_s > 1.2 * RECENT * period && lock.learnt > 0.5 {
-            let mut cut: Option<(f64, Lock, Fit)> = None;
-            for kept in KEPT {
-                let mut shorter = lock;
-                shorter.since = t - (kept * period).max(LEAST_KEPT * self.history.step_s());
-                shorter.size = lock.size.max(fit.wave.a.norm());
-                shorter.before = start.omega;
-                let Some(found) = self.search(&shorter, &start, t, &WIDE) else {
-                    continue;
-                };
-                let gain = self.misfit(&fit.wave, t - shorter.since) / variance - found.cost;
-                if gain > PROOF && cut.as_ref().is_none_or(|(most, ..)| gain > *most) {
-                    cut = Some((gain, shorter, found));
-                }
+        if !short && surprised && lock.learnt > LEARNT {
+            // Is there a wave that explains the newest past much better than the old one does?
+            let mut fresh = lock;
+            fresh.before = start;
+            fresh.size = start.a.norm();
+            if let Some((gain, found, cut)) = self.cut(&fresh, &start, t, &WIDE)
+                && gain > PROOF
+            {
+                return Some((found, cut));
             }
-            if let Some((_, shorter, found)) = cut {
-                lock = shorter;
-                fit = found;
+        } else if short {
+            // Where exactly the change was shows only now; the frequency may still be far off.
+            let here = self.search(&lock, &fit.wave, t, &NEAR);
+            let gain = here.map(|here| self.gain(&lock, &here, t));
+            if let Some((other, found, cut)) = self.cut(&lock, &fit.wave, t, &NEAR)
+                && gain.is_none_or(|gain| other > gain)
+            {
+                return Some((found, cut));
             }
-        } else if since_s < period {
-            // While the window is short the frequency may still be far off.
-            if let Some(better) = self.search(&lock, &fit.wave, t, &NEAR) {
-                fit = better;
-            }
+            fit = here?;
         }
         Some((lock, fit))
+    }
+
+    /// By how much `fit` explains the lock's window better than the wave before it, in variances.
+    fn gain(&self, lock: &Lock, fit: &Fit, t: f64) -> f64 {
+        self.misfit(&lock.before, t - lock.since) / self.variance(lock) - fit.cost
+    }
+
+    /// The likeliest place to cut the past off, of those in [`KEPT`] that are nearer than the present one:
+    /// gain, lock and fit.
+    fn cut(&self, lock: &Lock, start: &Wave, t: f64, factors: &[f64]) -> Option<(f64, Lock, Fit)> {
+        let period = TAU / lock.before.omega.abs();
+        let mut best: Option<(f64, Lock, Fit)> = None;
+        for kept in KEPT {
+            let kept_s = (kept * period).max(LEAST_KEPT * self.history.step_s());
+            let shorter = Lock {
+                since: t - kept_s,
+                ..*lock
+            };
+            if shorter.since <= lock.since {
+                continue;
+            }
+            let Some(fit) = self.search(&shorter, start, t, factors) else {
+                continue;
+            };
+            let gain = self.gain(&shorter, &fit, t);
+            if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
+                best = Some((gain, shorter, fit));
+            }
+        }
+        best
     }
 
     /// The likeliest wave in the lock's window: at the tempo there was before the cut, or at another one,
     /// looked for at `factors` times the frequency of `start`.
     fn search(&self, lock: &Lock, start: &Wave, t: f64, factors: &[f64]) -> Option<Fit> {
-        let kept = self.tuned(lock, lock.before, KEPT_TEMPO, t);
+        let kept = self.tuned(lock, lock.before.omega, KEPT_TEMPO, t);
         let others = (factors.iter())
             .filter_map(|factor| self.tuned(lock, start.omega * factor, FREE, t))
             .map(|mut fit| {
@@ -220,7 +261,9 @@ impl FastEstimator {
     /// The bank's best proposal.
     fn candidate(&self) -> Option<Candidate> {
         let slow = self.slow.best(|c| c.periods > 0.4 && c.explained > 0.5);
-        let quick = self.quick.best(|c| c.periods > 0.2 && c.explained > 0.7);
+        // Less than half a period of a line could be anything.
+        let least = 0.2 + 0.3 * (1.0 - self.shape.roundness());
+        let quick = self.quick.best(|c| c.periods > least && c.explained > 0.7);
         match (slow, quick) {
             (Some(slow), Some(quick)) if quick.power > 1.5 * slow.power => Some(quick),
             (Some(slow), _) => Some(slow),
@@ -247,27 +290,42 @@ impl FastEstimator {
             since: t - since_s,
             centre: None,
             size: fit.wave.a.norm(),
-            before: fit.wave.omega,
+            before: fit.wave,
+            share: 0.0,
+            doubt: 0.0,
         };
         Some((lock, fit))
     }
 
     fn update(&mut self, t: f64, dt: f64) {
         let mut held = self.lock.take().and_then(|lock| self.follow(lock, t));
-        let candidate = self.candidate();
-        if let Some(candidate) = candidate {
-            let taken = held.as_ref().is_some_and(|(lock, fit)| {
+        if let Some(candidate) = self.candidate() {
+            let doubt = held.as_mut().map(|(lock, fit)| {
                 let power = fit.wave.a.norm_sqr() * self.shape.power();
-                let short = t - lock.since < 1.5 * TAU / fit.wave.omega.abs();
-                fit.explained() > 0.5 && (short || power > 0.7 * candidate.power)
+                let pace = TAU * candidate.frequency_hz / fit.wave.omega;
+                let alike = (0.8..1.25).contains(&pace)
+                    && (0.6..1.7).contains(&(power / candidate.power.max(1e-12)));
+                let poor = fit.explained() < 0.5;
+                if alike && !poor {
+                    lock.doubt = 0.0;
+                } else {
+                    let urgency = if poor { 1.0 / DOUBT[0] } else { 1.0 / DOUBT[1] };
+                    lock.doubt += urgency * dt * candidate.frequency_hz.abs();
+                }
+                lock.doubt
             });
-            if !taken
-                && let Some((lock, fit)) = self.seed(&candidate, t)
-                && held
-                    .as_ref()
-                    .is_none_or(|(_, old)| fit.evidence() > old.evidence() + 2.0)
+            if doubt.is_none_or(|doubt| doubt > 1.0)
+                && let Some((mut lock, fit)) = self.seed(&candidate, t)
             {
-                held = Some((lock, fit));
+                match &held {
+                    None => held = Some((lock, fit)),
+                    Some((old, held_fit)) if fit.evidence() > held_fit.evidence() + 2.0 => {
+                        lock.share = old.share;
+                        lock.noise = lock.noise.max(old.noise);
+                        held = Some((lock, fit));
+                    }
+                    Some(_) => {}
+                }
             }
         }
         self.raw = WaveEstimate::default();
@@ -283,9 +341,9 @@ impl FastEstimator {
         let since_s = t - lock.since;
         let explained = fit.explained();
         if since_s * hz.abs() > 0.8 {
-            let pace = (periods / lock.learnt.clamp(0.3, 2.0)).min(1.0);
+            let pace = (periods / lock.learnt.clamp(0.3, 1.0)).min(1.0);
             let (left, _) = self.recent(&fit.wave, since_s);
-            let left = left.min(if lock.learnt > 0.5 {
+            let left = left.min(if lock.learnt > LEARNT {
                 3.0 * lock.noise + 1e-6
             } else {
                 f64::INFINITY
@@ -298,9 +356,15 @@ impl FastEstimator {
             lock.size += (size - lock.size) * periods.min(1.0);
         }
         self.full = (since_s * hz.abs() / (2.0 * self.lambda)).min(1.0);
-        let share = gate(explained, fit.evidence());
+        let mut share = gate(explained, fit.evidence()) * sure(&fit);
+        if lock.centre.is_none() {
+            share *= self.seen(since_s.min(self.history.covered_s()) * hz.abs());
+        }
+        let falling = share < lock.share && since_s * hz.abs() < SHORT;
+        let pace = periods / if falling { 0.5 } else { 0.1 };
+        lock.share += pace.min(1.0) * (share - lock.share);
         self.raw = WaveEstimate {
-            amplitude: share * fit.wave.a.norm(),
+            amplitude: lock.share * fit.wave.a.norm(),
             frequency_hz: hz,
             phase_rad: wrap_tau(fit.wave.a.arg()),
             quality: explained,
@@ -342,6 +406,13 @@ impl FastEstimator {
     }
 }
 
+/// Share of an amplitude that is believed by how well it is known: all up to a deviation of a quarter,
+/// nothing from a half.
+fn sure(fit: &Fit) -> f64 {
+    let relative = fit.deviation / fit.wave.a.norm().max(1e-9);
+    ((0.5 - relative) / 0.25).clamp(0.0, 1.0)
+}
+
 /// The newest part of the past that is watched for changes, periods.
 const RECENT: f64 = 0.3;
 /// Fewest samples of it.
@@ -359,11 +430,18 @@ const WIDE: [f64; 8] = [1.0, 1.3, 1.7, 2.2, 2.8, 0.75, 0.55, 0.4];
 /// and while the window is short.
 const NEAR: [f64; 3] = [1.0, 1.3, 0.75];
 /// Fewest steps that are kept.
-const LEAST_KEPT: f64 = 4.0;
+const LEAST_KEPT: f64 = 2.5;
+/// A window shorter than this, in periods, is searched again with every sample.
+const SHORT: f64 = 0.4;
+/// Periods of noise learnt before changes are looked for.
+const LEARNT: f64 = 1.0;
+/// Periods for which a bank must know better before it is believed: against a wave that hardly explains
+/// the past, and against one that does.
+const DOUBT: [f64; 2] = [0.5, 1.2];
 /// Standard deviations of surprise at which a change is looked for.
 const SURPRISE: f64 = 2.5;
 /// By how much a new wave must fit better than the old one, in variances, to be a change.
-const PROOF: f64 = 25.0;
+const PROOF: f64 = 45.0;
 /// Departures from the wave that are never a surprise, as a share of the amplitude.
 const FLOOR: f64 = 0.02;
 /// Time constant of amplitude and frequency with a short window and with a full one, seconds.

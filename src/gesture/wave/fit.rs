@@ -90,6 +90,8 @@ pub(super) struct Fit {
     pub residual: f64,
     /// Mean square about the mean.
     pub energy: f64,
+    /// Standard deviation of the amplitude.
+    pub deviation: f64,
     /// What data and beliefs together hold against this fit, in variances: smaller is likelier.
     pub cost: f64,
 }
@@ -212,6 +214,14 @@ impl Task<'_> {
         } else {
             0.0
         };
+        // Variance of a along its own direction; noise is what is left, or at least what is believed.
+        let a = C::new(found[0], found[1]);
+        let along = a / a.norm().max(1e-12);
+        let mut unit = SVector::<f64, UNKNOWNS>::zeros();
+        unit[0] = along.re;
+        unit[1] = along.im;
+        let spread = cholesky.solve(&unit).dot(&unit).max(0.0);
+        let deviation = (spread * f64::max(variance, 0.5 * residual)).sqrt();
         let mut cost = fitted.max(0.0)
             + size * (found[0] * found[0] + found[1] * found[1])
             + shape * (found[2] * found[2] + found[3] * found[3]);
@@ -223,13 +233,14 @@ impl Task<'_> {
             cost: cost / variance,
             wave: Wave {
                 omega: omega + change,
-                a: C::new(found[0], found[1]),
+                a,
                 b: C::new(found[2], found[3]),
                 c: C::new(found[4], found[5]),
             },
             count,
             residual,
             energy,
+            deviation,
         })
     }
 

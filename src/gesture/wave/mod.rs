@@ -4,6 +4,8 @@
 //! construction.
 
 mod bank;
+mod correlation;
+mod direct;
 mod estimator;
 mod fast;
 mod fit;
@@ -15,6 +17,8 @@ mod shape;
 mod smooth;
 mod window;
 
+pub use correlation::CorrelationEstimator;
+pub use direct::DirectEstimator;
 pub use estimator::{Estimator, EstimatorKind, LONGEST_GAP_S, PlanePoint, WaveEstimate};
 pub use fast::FastEstimator;
 pub use gabor::GaborEstimator;
