@@ -240,16 +240,18 @@ impl Figure {
         Ok(())
     }
 
-    /// Every named series once, in rows that fit the width.
+    /// Every named series once, in the order of colours, in rows that fit the width.
     fn legend_rows(&self) -> Vec<Vec<&Series>> {
+        let mut named: Vec<&Series> = Vec::new();
+        for series in self.panels.iter().flat_map(|panel| &panel.series) {
+            if !series.name.is_empty() && !named.iter().any(|known| known.name == series.name) {
+                named.push(series);
+            }
+        }
+        named.sort_by_key(|series| series.color);
         let mut rows: Vec<Vec<&Series>> = Vec::new();
         let mut x = u32::MAX;
-        let mut seen: Vec<&str> = Vec::new();
-        for series in self.panels.iter().flat_map(|panel| &panel.series) {
-            if series.name.is_empty() || seen.contains(&series.name.as_str()) {
-                continue;
-            }
-            seen.push(&series.name);
+        for series in named {
             let width = entry_width(&series.name) as u32;
             if x.saturating_add(width) > self.size.0 {
                 rows.push(Vec::new());
@@ -327,9 +329,10 @@ where
     area.draw(&title)?;
     let named = !panel.x.names.is_empty();
     let grey = RGBColor(225, 225, 225);
+    // Those of logarithmic axes are drawn below: the library knows powers of ten only.
     let numbers = |axis: &Axis| {
-        let decimals = decimals(axis);
-        move |value: &f64| format!("{value:.decimals$}")
+        let decimals = (!axis.log).then(|| decimals(axis));
+        move |value: &f64| decimals.map_or(String::new(), |d| format!("{value:.d$}"))
     };
     let (x_numbers, y_numbers) = (numbers(&panel.x), numbers(&panel.y));
     let mut mesh = chart.configure_mesh();
@@ -343,8 +346,11 @@ where
         .y_labels(if panel.y.log { 0 } else { 6 })
         .x_desc(&panel.x.label)
         .y_desc(&panel.y.label);
-    if named {
+    if named || panel.x.log {
         mesh.disable_x_mesh();
+    }
+    if panel.y.log {
+        mesh.disable_y_mesh();
     }
     mesh.draw()?;
     let corner = area.get_base_pixel();

@@ -17,7 +17,7 @@ const RATE_HZ: f64 = 30.0;
 /// After a change of what is performed, nothing is judged for this long: all methods look back.
 const SETTLING_S: f64 = 1.5;
 /// A lesson of the support vector machine, in seconds.
-const LESSON_S: f64 = 6.0;
+const LESSON_S: f64 = 4.0;
 /// Tracker noise in lessons made from reference frames, metres.
 const LESSON_NOISE_M: f64 = 0.0005;
 
@@ -271,7 +271,7 @@ fn performed_in(spans: &[(f64, f64)], t: f64) -> bool {
 /// A synthetic hand rotates its thumb, then all fingers, then both at once.
 ///
 /// The performance is quicker and a little smaller than what was shown; the support vector machine
-/// learns from six seconds of each gesture as shown, and as much rest.
+/// learns from four seconds of each gesture as shown, and as much rest.
 ///
 /// # Errors
 /// See [`StudyError`].
@@ -310,7 +310,7 @@ pub fn hand_independence(subjects: &[Subject], seed: u64) -> Result<Independence
         frequency_hz: Curve::constant(1.6),
     });
     script.noise = HAND_NOISE;
-    script.rate_hz = 60.0;
+    script.rate_hz = RATE_HZ;
     let recording = Recording {
         header: performer.header.clone(),
         samples: record(&script, seed),
@@ -411,10 +411,14 @@ impl RealPerformance {
             .collect()
     }
 
-    /// The performance with only every `step`-th sample, for a quick look.
-    pub fn thinned(mut self, step: usize) -> Self {
+    /// A stretch of the performance with only every `step`-th sample, for a quick look.
+    pub fn excerpt(mut self, from_s: f64, to_s: f64, step: usize) -> Self {
         let samples = std::mem::take(&mut self.recording.samples);
-        self.recording.samples = samples.into_iter().step_by(step.max(1)).collect();
+        self.recording.samples = samples
+            .into_iter()
+            .filter(|sample| (from_s..to_s).contains(&sample.t))
+            .step_by(step.max(1))
+            .collect();
         self
     }
 

@@ -9,6 +9,8 @@ use crate::gesture::{DefineError, EstimatorKind, FrontEndError};
 
 /// Windows in periods over which error is traded for delay.
 const LAMBDAS: [f64; 6] = [0.25, 0.35, 0.5, 2.0 / 3.0, 0.9, 1.2];
+/// The stretch of the recorded performance that is enough for a quick look.
+const QUICK_S: (f64, f64) = (29.0, 51.0);
 /// The noise at which error is set against delay.
 pub const TRADE_NOISE: f64 = 0.1;
 
@@ -194,7 +196,11 @@ pub fn study(
         .independence
         .push(hand_independence(&options.subjects, options.seed)?);
     if let Some(real) = &options.real {
-        let real = real.clone().thinned(if options.quick { 3 } else { 1 });
+        let real = if options.quick {
+            real.clone().excerpt(QUICK_S.0, QUICK_S.1, 3)
+        } else {
+            real.clone()
+        };
         let seen = real_independence(&real, &options.subjects, options.seed)?;
         real.measure(&seen, &options.subjects, &mut result.rows);
         result.independence.push(seen);

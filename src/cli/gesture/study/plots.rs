@@ -113,15 +113,9 @@ fn delay_error(study: &Study, subjects: &[Subject]) -> Figure {
             style: Style::Ring,
             points: rings,
         });
-        let longest = drawn
-            .iter()
-            .flat_map(|s| &s.points)
-            .map(|(x, _)| *x)
-            .filter(|x| x.is_finite())
-            .fold(1.0, f64::max);
         panel(
             title,
-            Axis::linear("settling after the step [s]", 0.0, 1.08 * longest),
+            Axis::log("settling after the step [s]", 0.08, 6.0),
             Axis::log(&format!("steady error [{unit}]"), y.0, y.1),
             drawn,
         )
@@ -346,7 +340,7 @@ fn waves(study: &Study, subjects: &[Subject]) -> Figure {
             panel(
                 "phase error",
                 time(),
-                Axis::linear("error [deg]", -120.0, 120.0),
+                Axis::linear("error [deg]", -180.0, 180.0),
                 phase,
             ),
         ],
@@ -394,7 +388,7 @@ fn activities(independence: &Independence, title: &str, subjects: &[Subject]) ->
             Panel {
                 spans: spans(&independence.t, &independence.performed[index]),
                 ..panel(
-                    &format!("`{gesture}` (shaded where it is performed)").replace('`', "\u{201d}"),
+                    &format!("{gesture}: shaded where it is performed"),
                     Axis::linear("time [s]", 0.0, end),
                     Axis::linear("activity", 0.0, 1.25),
                     series,
