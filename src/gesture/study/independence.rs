@@ -532,3 +532,66 @@ pub fn real_independence(
         subjects,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_of_the_recorded_performance_are_those_of_its_recipe() {
+        let recipe = include_str!("../../../configs/performances/drum_and_splay.toml");
+        let recipe: toml::Table = recipe.parse().expect("TOML");
+        let mut from = 0.0;
+        for segment in recipe["segment"].as_array().expect("segments") {
+            let number = |key: &str| segment.get(key).and_then(toml::Value::as_float);
+            let kind = segment["kind"].as_str().expect("a kind");
+            let speed = number("speed").unwrap_or(1.0);
+            let duration = number("duration_s").unwrap_or_else(|| {
+                let length = number("to").expect("an end") - number("from").expect("a start");
+                length.abs() / speed
+            });
+            // The middle of the segment: joins and rounding are at its ends.
+            let middle = from + 0.5 * duration;
+            let row = DRUM_AND_SPLAY
+                .iter()
+                .find(|(start, end, ..)| (*start..*end).contains(&middle))
+                .unwrap_or_else(|| panic!("no part at {middle:.2} s"));
+            let splay = segment["source"].as_str() == Some("splay");
+            match kind {
+                "loop" => {
+                    assert_eq!(row.2, Some(0), "at {middle:.2} s");
+                    assert!(
+                        (row.0 - from).abs() < 0.02,
+                        "starts at {from:.3} s: {row:?}"
+                    );
+                    assert_eq!(row.3, number("size").unwrap_or(1.0), "at {middle:.2} s");
+                    assert!((row.4 - speed / 1.05).abs() < 1e-9, "at {middle:.2} s");
+                }
+                "cut" => assert_eq!(row.2, Some(1), "at {middle:.2} s"),
+                _ if splay && middle > 38.0 => assert_eq!(row.2, Some(1), "at {middle:.2} s"),
+                _ => assert_eq!(row.2, None, "at {middle:.2} s"),
+            }
+            from += duration;
+        }
+        assert!((from - 55.67).abs() < 0.05, "the recipe lasts {from:.2} s");
+    }
+
+    #[test]
+    fn a_change_is_not_judged_while_methods_still_look_back() {
+        let t: Vec<f64> = (0..60).map(|k| f64::from(k) * 0.1).collect();
+        let performed = vec![t.iter().map(|t| (2.0..4.0).contains(t)).collect()];
+        let seen = Independence {
+            name: "test",
+            gestures: vec!["wave".into()],
+            t,
+            performed,
+            methods: Vec::new(),
+        };
+        let states = seen.states();
+        let names: Vec<&str> = states.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["rest", "wave"]);
+        // Rest: the first 2 s, and what is left 1.5 s after it is taken up again.
+        assert_eq!(states[0].1.len(), 20 + 5);
+        assert_eq!(states[1].1, (35..40).collect::<Vec<_>>());
+    }
+}

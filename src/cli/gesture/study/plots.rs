@@ -349,7 +349,10 @@ fn waves(study: &Study, subjects: &[Subject]) -> Figure {
 
 /// Figure 9.15: what each method makes of each gesture; shaded where it is performed.
 fn activities(independence: &Independence, title: &str, subjects: &[Subject]) -> Figure {
-    let end = independence.t.last().copied().unwrap_or(1.0);
+    let (start, end) = match independence.t[..] {
+        [start, .., end] => (start, end),
+        _ => (0.0, 1.0),
+    };
     // The thesis's estimator and the default are enough; the CSV has them all.
     let shown: Vec<Subject> = subjects
         .iter()
@@ -389,7 +392,7 @@ fn activities(independence: &Independence, title: &str, subjects: &[Subject]) ->
                 spans: spans(&independence.t, &independence.performed[index]),
                 ..panel(
                     &format!("{gesture}: shaded where it is performed"),
-                    Axis::linear("time [s]", 0.0, end),
+                    Axis::linear("time [s]", start, end),
                     Axis::linear("activity", 0.0, 1.25),
                     series,
                 )
