@@ -61,14 +61,23 @@ fn panel(title: &str, x: Axis, y: Axis, series: Vec<Series>) -> Panel {
     }
 }
 
+/// A label with its unit, if it has one.
+fn with_unit(label: &str, unit: &str) -> String {
+    if unit == "1" {
+        label.to_owned()
+    } else {
+        format!("{label} [{unit}]")
+    }
+}
+
 /// The decades (or thirds of them) that hold all values of some series.
 fn decades(series: &[Series]) -> (f64, f64) {
     let values = || {
         series
             .iter()
             .flat_map(|s| &s.points)
+            .filter(|(x, y)| x.is_finite() && y.is_finite() && *y > 1e-6)
             .map(|(_, y)| *y)
-            .filter(|y| y.is_finite() && *y > 1e-6)
     };
     let low = values().fold(f64::INFINITY, f64::min);
     let high = values().fold(0.0, f64::max);
@@ -116,7 +125,7 @@ fn delay_error(study: &Study, subjects: &[Subject]) -> Figure {
         panel(
             title,
             Axis::log("settling after the step [s]", 0.08, 6.0),
-            Axis::log(&format!("steady error [{unit}]"), y.0, y.1),
+            Axis::log(&with_unit("steady error", unit), y.0, y.1),
             drawn,
         )
     };
@@ -232,7 +241,7 @@ fn noise(study: &Study, subjects: &[Subject]) -> Figure {
         panel(
             title,
             Axis::log("noise per component", 0.009, 0.35),
-            Axis::log(&format!("error [{unit}]"), y.0, y.1),
+            Axis::log(&with_unit("error", unit), y.0, y.1),
             lines,
         )
     };

@@ -288,7 +288,7 @@ const TABLES: [Table; 5] = [
         ],
     ),
     (
-        "Figure 9.5: the whole performance, changes included",
+        "Figure 9.5: root mean square errors from 2 s on, changes included",
         &[
             ("a error", "1", "figure-9.5", f64::NAN, "amplitude_error"),
             (

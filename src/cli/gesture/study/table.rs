@@ -121,6 +121,7 @@ pub(super) fn cell(value: Option<f64>, unit: &str) -> String {
             "s" => format!("{value:.2}"),
             "deg" => format!("{value:.1}"),
             "%" => format!("{:.0} %", 100.0 * value),
+            _ if value >= 1.0 => format!("{value:.2}"),
             _ => format!("{value:.4}"),
         },
     }
