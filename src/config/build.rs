@@ -1,17 +1,19 @@
 //! From a configuration to checked parts: every file read, every name resolved, every number in range.
 
+use super::channel::{self, ChannelParts, channel_parts};
 use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, OnExit, OnLost, OnServoFault};
 use super::files::Files;
 use super::motion::{
-    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts, read,
+    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts,
+    neighbourhoods, read,
 };
 use super::servos::servo_map;
 use crate::base::suggest::hint;
 use crate::body::JointSpace;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
-use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet};
+use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet, PerformerScale};
 use crate::motion::Animator;
 use crate::motion::class::MotionClass;
 use crate::motion::clip::ClipKind;
@@ -62,6 +64,7 @@ pub struct Character {
     pub view_hz: f64,
     graph: GraphParts,
     layers: Vec<LayerParts>,
+    channels: Vec<ChannelParts>,
 }
 
 /// Ramps and policies, checked.
@@ -122,6 +125,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         .iter()
         .map(|entry| layer_parts(&files, entry, &joints, &at))
         .collect::<Result<_, _>>()?;
+    let channels = channel_parts(&file, &at)?;
     let end_pose = match &file.safety.end_clip {
         Some(path) => {
             let clip = clip(&files, path, "safety.end_clip", &joints, &at)?;
@@ -165,6 +169,8 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         front_options: FrontEndOptions {
             estimator,
             lambda: file.input.window,
+            scale: performer_scale(&file, &at)?,
+            ..FrontEndOptions::default()
         },
         safety: Safety {
             ramp_s: safety.ramp_s,
@@ -191,6 +197,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         end_pose,
         graph,
         layers,
+        channels,
     };
     character
         .check_watchdog(character.rate_hz)
@@ -199,6 +206,11 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
 }
 
 impl Character {
+    /// Adds the derived channels to those of `front`.
+    pub fn with_channels(&self, front: FrontEnd) -> Result<FrontEnd, ConfigError> {
+        channel::bind(front, &self.channels, &self.config_name)
+    }
+
     /// The animator, with layers bound to the channels of `front`.
     pub fn animator(&self, front: &FrontEnd) -> Result<Animator, ConfigError> {
         let ranges = joint_ranges(&self.limits);
@@ -270,10 +282,30 @@ impl Character {
         Envelope::new(self.limits.clone(), dt_s)
     }
 
+    /// Per node of the motion graph the gestures that compete there, for
+    /// [`FrontEnd::with_neighbourhoods`].
+    pub fn neighbourhoods(&self) -> Vec<Vec<usize>> {
+        neighbourhoods(&self.graph.1, &self.classes, self.gestures.gestures.len())
+    }
+
     /// Names of the layers, in order.
     pub fn layer_names(&self) -> Vec<String> {
         self.layers.iter().map(|l| l.name.clone()).collect()
     }
+}
+
+/// The scale of `[input] scale`: a number, or `"rest"`.
+fn performer_scale(file: &CharacterFile, at: &Pointer<'_>) -> Result<PerformerScale, ConfigError> {
+    let Some(value) = &file.input.scale else {
+        return Ok(PerformerScale::default());
+    };
+    let written = match value.get_ref() {
+        toml::Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    written
+        .parse()
+        .map_err(|problem: String| at.at(value.span(), "input.scale", problem))
 }
 
 fn joint_ranges(limits: &[JointEnvelope]) -> Vec<JointRange> {
