@@ -238,7 +238,7 @@ fn waves(
 ) -> Result<(PerGesture, PerGesture), FrontEndError> {
     let options = FrontEndOptions {
         estimator,
-        lambda: None,
+        ..FrontEndOptions::default()
     };
     let mut front = FrontEnd::new(set, &recording.header, options)?;
     let mut amplitude = vec![Vec::with_capacity(t.len()); set.gestures.len()];

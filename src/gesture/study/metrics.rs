@@ -43,12 +43,12 @@ pub fn reaching_s(t: &[f64], values: &[f64], step_s: f64, level: f64, rising: bo
 
 /// Root mean square of the errors; NaN for none.
 pub fn rms(errors: impl Iterator<Item = f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
+    let (mut sum, mut count) = (0.0_f64, 0.0);
     for error in errors {
         sum += error * error;
         count += 1.0;
     }
-    (sum / count as f64).sqrt()
+    f64::sqrt(sum / count)
 }
 
 /// Root mean square difference of two phases in degrees.

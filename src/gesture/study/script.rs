@@ -152,7 +152,14 @@ impl<'a> Player<'a> {
         estimator: EstimatorKind,
         lambda: Option<f64>,
     ) -> Result<Self, FrontEndError> {
-        let options = FrontEndOptions { estimator, lambda };
+        let options = FrontEndOptions {
+            estimator,
+            lambda,
+            // Its filter of jumps would take part of the noise away, which is to reach the plane
+            // exactly as asked.
+            trust_tracker: true,
+            ..FrontEndOptions::default()
+        };
         Ok(Self {
             performer,
             front: FrontEnd::new(&performer.set, &performer.header, options)?,
