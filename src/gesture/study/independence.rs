@@ -258,9 +258,9 @@ fn waves(
 }
 
 /// From when to when the synthetic hand's thumb, and its whole hand, are performed.
-const THUMB_S: [(f64, f64); 2] = [(3.0, 9.0), (21.0, 27.0)];
-const HAND_S: [(f64, f64); 2] = [(12.0, 18.0), (21.0, 27.0)];
-const HAND_END_S: f64 = 30.0;
+const THUMB_S: [(f64, f64); 2] = [(2.0, 7.0), (16.0, 21.0)];
+const HAND_S: [(f64, f64); 2] = [(9.0, 14.0), (16.0, 21.0)];
+const HAND_END_S: f64 = 23.0;
 /// Noise on the thumb's plane: that of a good hand tracker.
 const HAND_NOISE: f64 = 0.05;
 

@@ -10,7 +10,7 @@ use crate::gesture::{DefineError, EstimatorKind, FrontEndError};
 /// Windows in periods over which error is traded for delay.
 const LAMBDAS: [f64; 6] = [0.25, 0.35, 0.5, 2.0 / 3.0, 0.9, 1.2];
 /// The stretch of the recorded performance that is enough for a quick look.
-const QUICK_S: (f64, f64) = (29.0, 51.0);
+const QUICK_S: (f64, f64) = (30.0, 50.0);
 /// The noise at which error is set against delay.
 pub const TRADE_NOISE: f64 = 0.1;
 
