@@ -16,6 +16,8 @@ use crate::pose::{PoseHeader, PoseSample, Recording};
 const RATE_HZ: f64 = 30.0;
 /// After a change of what is performed, nothing is judged for this long: all methods look back.
 const SETTLING_S: f64 = 1.5;
+/// In a recorded performance the estimates count this long after a change.
+const STEADY_S: f64 = 2.0;
 /// A lesson of the support vector machine, in seconds.
 const LESSON_S: f64 = 4.0;
 /// Tracker noise in lessons made from reference frames, metres.
@@ -71,7 +73,7 @@ impl Independence {
         for (k, t) in self.t.iter().enumerate() {
             let state = self.performed_at(k);
             if state != last {
-                since = if last.is_empty() { *t - SETTLING_S } else { *t };
+                since = *t;
                 last.clone_from(&state);
             }
             let index = match states.iter().position(|(name, _)| *name == state) {
@@ -433,7 +435,9 @@ impl RealPerformance {
             let (mut amplitude, mut frequency) = (Vec::new(), Vec::new());
             let (mut silent, mut other) = (0.0_f64, 0.0_f64);
             for (k, t) in seen.t.iter().enumerate() {
-                let judged = |part: &&Part| *t >= part.from_s + 2.0 && *t < part.to_s;
+                let start = seen.t.first().copied().unwrap_or(0.0);
+                let judged =
+                    |part: &&Part| *t >= part.from_s.max(start) + STEADY_S && *t < part.to_s;
                 let (size, hz) = (method.activity[0][k], method.frequency_hz[0][k]);
                 match self.parts.iter().find(judged) {
                     Some(part) if part.gesture == Some(0) => {
@@ -590,8 +594,8 @@ mod tests {
         let states = seen.states();
         let names: Vec<&str> = states.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["rest", "wave"]);
-        // Rest: the first 2 s, and what is left 1.5 s after it is taken up again.
-        assert_eq!(states[0].1.len(), 20 + 5);
+        // Rest: from 1.5 s on, and what is left 1.5 s after it is taken up again.
+        assert_eq!(states[0].1.len(), 5 + 5);
         assert_eq!(states[1].1, (35..40).collect::<Vec<_>>());
     }
 }
