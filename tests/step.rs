@@ -1,4 +1,4 @@
-//! The pure step: no allocation, the same bits again, inside the limits whatever comes in, calm when poses are lost.
+//! The pure step: no allocation, the same bits again, inside the limits whatever comes in.
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 
 mod support;
@@ -6,7 +6,7 @@ mod support;
 use handwave::base::{JointState, Time};
 use handwave::live::session;
 use handwave::pose::PoseSample;
-use handwave::puppet::{Inputs, Stage};
+use handwave::puppet::Inputs;
 use handwave::sim::fault::Chance;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
