@@ -9,18 +9,20 @@ mod correlate;
 mod independence;
 mod metrics;
 mod performer;
+mod recorded;
 mod scenes;
 mod script;
 mod suite;
 mod svm;
 
 pub use correlate::{Match, Poses, Template};
-pub use independence::{Independence, Method, Part, RealPerformance, wave_method};
+pub use independence::{Independence, Method, wave_method};
 pub use metrics::{
     ABORT_AMPLITUDE, START_AMPLITUDE, activations, best_lag, median, reaching_s, rms,
     rms_phase_deg, settling_s, share_above,
 };
 pub use performer::{Doing, Performer};
+pub use recorded::{Part, RealPerformance};
 pub use scenes::{SIGNAL_TO_NOISE, STEP_NOISES, figure_9_5};
 pub use script::{Curve, Moment, Player, Role, Script, Trace, Waves, rehearse};
 pub use suite::{

@@ -1,8 +1,9 @@
 //! Runs every estimator over every sequence and gathers the rows.
 
-use super::independence::{Independence, RealPerformance, hand_independence, real_independence};
+use super::independence::{Independence, hand_independence};
 use super::metrics::{median, rms, rms_phase_deg};
 use super::performer::Performer;
+use super::recorded::{RealPerformance, real_independence};
 use super::scenes::{Cast, Scene, before_s, figure_9_5, scenes, steps};
 use super::script::{Player, Trace, rehearse};
 use crate::gesture::{DefineError, EstimatorKind, FrontEndError};
