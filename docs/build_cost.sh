@@ -16,6 +16,8 @@ build() {
 }
 echo '| build | crates | wall clock | CPU | program |'
 echo '|---|---|---|---|---|'
-build 'default (`tui`)'
-build 'without `tui`' --no-default-features
+build 'default (`tui`, `plot`)'
+build 'without `tui`' --no-default-features --features plot
+build 'without `plot`' --no-default-features --features tui
+build 'with none of them' --no-default-features
 build 'with `dxl-serial2`' --features dxl-serial2

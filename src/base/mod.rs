@@ -3,6 +3,7 @@
 pub mod angle;
 pub mod joints;
 pub mod print;
+pub mod random;
 pub mod suggest;
 pub mod time;
 

@@ -1,8 +1,9 @@
-//! `handwave gesture`: define gestures, estimate their waves over a recording, check a set.
+//! `handwave gesture`: define gestures, estimate their waves over a recording, check a set, compare estimators.
 
 mod check;
 mod define;
 mod estimate;
+mod study;
 
 use super::{ExitStatus, Failure};
 use crate::gesture::{GestureSet, PerformerScale};
@@ -80,6 +81,9 @@ own gesture and 0 to all others; above 0.2 the two may be confused.")]
         #[arg(long)]
         json: bool,
     },
+    /// Compare all wave estimators on the same sequences: CSV, plots and a short report.
+    #[command(after_help = study::EXAMPLES)]
+    Study(study::StudyArgs),
 }
 
 /// Runs `handwave gesture`.
@@ -98,6 +102,7 @@ pub fn run(args: GestureArgs) -> Result<ExitStatus, Failure> {
         } => estimate::estimate(&gestures, &poses, &out, &estimator, scale),
         GestureCommand::List { gestures, json } => check::list(&gestures, json),
         GestureCommand::Check { gestures, json } => check::check(&gestures, json),
+        GestureCommand::Study(args) => study::study(&args),
     }
 }
 

@@ -14,6 +14,7 @@ mod period;
 mod plane;
 mod separability;
 mod set;
+pub mod study;
 mod tracker;
 mod wave;
 

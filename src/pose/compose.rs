@@ -47,6 +47,7 @@
 //!   shrinking half-way. A loop that follows a loop over the same stretch takes over its phase.
 
 use super::{GlobalFit, GlobalOptions, PoseError, PoseHeader, PoseSample, Recording};
+use crate::base::random::SplitMix;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -288,19 +289,6 @@ impl Segment {
     }
 }
 
-/// A small generator of pseudo-random numbers (SplitMix64): the same everywhere, for ever.
-struct SplitMix(u64);
-
-impl SplitMix {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-}
-
 /// Composes the performance that the recipe at `path` describes.
 ///
 /// The same recipe and recordings give the same samples, bit for bit on one build.
@@ -465,14 +453,14 @@ fn play(
     sources: &[Source],
     seed: u64,
 ) -> Vec<PoseSample> {
-    let mut random = SplitMix(seed);
+    let mut random = SplitMix::new(seed);
     let mut samples: Vec<PoseSample> = Vec::new();
     let (mut t, mut begin) = (0.0, 0.0);
     for (index, segment) in segments.iter().enumerate() {
         let source = &sources[segment.source];
         // Step k leads from row k to row k + 1 of the recording.
         let steps = source.times.len() - 1;
-        let mut row = (random.next() % steps as u64) as usize;
+        let mut row = (random.bits() % steps as u64) as usize;
         let before = index.checked_sub(1).map(|before| &segments[before]);
         while t < begin + segment.duration - 1e-9 {
             let u = t - begin;

@@ -1,8 +1,11 @@
 //! What a person sees of a run: the terminal view, or a line now and then where there is no terminal.
+//! Plots for reports are in `plot` (feature `plot`).
 
 #[cfg(feature = "tui")]
 mod draw;
 mod lines;
+#[cfg(feature = "plot")]
+pub mod plot;
 #[cfg(feature = "tui")]
 mod terminal;
 #[cfg_attr(
