@@ -3,9 +3,11 @@
 pub mod angle;
 pub mod joints;
 pub mod print;
+pub mod random;
 pub mod suggest;
 pub mod time;
 
 pub use angle::wrap_pi;
 pub use joints::JointState;
+pub use random::SplitMix;
 pub use time::{Clock, Time, VirtualClock};

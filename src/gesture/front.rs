@@ -2,6 +2,7 @@
 
 use super::wave::ProgressionSmoother;
 use super::{Estimator, EstimatorKind, GestureKind, GestureSet, Plane, References};
+use super::{FeatureError, FeatureSpec, PoseFeatures};
 use crate::base::angle::wrap_tau;
 use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault};
 use std::f64::consts::TAU;
@@ -51,6 +52,9 @@ pub enum FrontEndError {
         /// The anchor's name.
         anchor: String,
     },
+    /// The features of a pose map.
+    #[error("{0}")]
+    Feature(#[from] FeatureError),
     /// An option out of range.
     #[error("option {key}: found {found}; allowed: {allowed}")]
     Option {
@@ -108,6 +112,8 @@ pub struct FrontEnd {
     channel_names: Vec<String>,
     channels: Vec<f64>,
     last_t: Option<f64>,
+    /// Features for pose maps, see [`FrontEnd::feature`].
+    features: Vec<PoseFeatures>,
 }
 
 impl std::fmt::Debug for FrontEnd {
@@ -130,7 +136,21 @@ impl FrontEnd {
         stream: &PoseHeader,
         options: FrontEndOptions,
     ) -> Result<Self, FrontEndError> {
-        if set.gestures.is_empty() {
+        Self::with_features(set, stream, options, &[])
+    }
+
+    /// The same with features for pose maps beside the gestures; with a feature the set may be
+    /// without gesture.
+    ///
+    /// # Errors
+    /// As [`FrontEnd::new`], and features that the stream cannot give.
+    pub fn with_features(
+        set: &GestureSet,
+        stream: &PoseHeader,
+        options: FrontEndOptions,
+        features: &[FeatureSpec],
+    ) -> Result<Self, FrontEndError> {
+        if set.gestures.is_empty() && features.is_empty() {
             return Err(FrontEndError::NoGestures);
         }
         if stream.dim != set.header.dim {
@@ -200,6 +220,10 @@ impl FrontEnd {
             channels: vec![0.0; channel_names.len()],
             channel_names,
             last_t: None,
+            features: features
+                .iter()
+                .map(|spec| PoseFeatures::new(spec, stream))
+                .collect::<Result<_, _>>()?,
         })
     }
 
@@ -293,6 +317,10 @@ impl FrontEnd {
                 *channel = *value;
             }
         }
+        for feature in &mut self.features {
+            // Sees the points of its map; where they are too few it stays as it was.
+            let _ = feature.push(sample);
+        }
         self.last_t = Some(sample.t);
         Ok(())
     }
@@ -318,6 +346,11 @@ impl FrontEnd {
             ahead.phase_rad = wrap_tau(ahead.phase_rad + TAU * ahead.frequency_hz * (t - last));
         }
         ahead
+    }
+
+    /// Features for pose map `index`, in the order they were asked for.
+    pub fn feature(&self, index: usize) -> Option<&PoseFeatures> {
+        self.features.get(index)
     }
 
     /// What was removed from the last pose as global motion.
@@ -374,6 +407,7 @@ impl FrontEnd {
         self.local.copy_from_slice(&self.home);
         self.channels.fill(0.0);
         self.motion = GlobalMotion::default();
+        self.features.iter_mut().for_each(PoseFeatures::reset);
         self.last_t = None;
     }
 }

@@ -5,6 +5,7 @@
 //! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
 
 mod define;
+mod feature;
 mod file;
 mod front;
 mod period;
@@ -16,6 +17,7 @@ mod wave;
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };
+pub use feature::{FeatureError, FeatureSpec, KERNEL_SIGMAS, PoseFeatures};
 pub use file::{GestureFileError, VERSION};
 pub use front::{FrontEnd, FrontEndError, FrontEndOptions, GestureEstimate};
 pub use period::{PeriodEstimate, find_period};

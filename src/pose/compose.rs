@@ -46,6 +46,7 @@
 //!   the other. Turning and shape are blended apart, as a hand turns between two postures without
 //!   shrinking half-way. A loop that follows a loop over the same stretch takes over its phase.
 
+use crate::base::SplitMix;
 use super::{GlobalFit, GlobalOptions, PoseError, PoseHeader, PoseSample, Recording};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -285,19 +286,6 @@ impl Segment {
             pose = mix(&self.center, &pose, self.size);
         }
         pose
-    }
-}
-
-/// A small generator of pseudo-random numbers (SplitMix64): the same everywhere, for ever.
-struct SplitMix(u64);
-
-impl SplitMix {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
     }
 }
 
