@@ -6,15 +6,15 @@ use super::root::RootMap;
 use super::volume::{LatentVolume, check_limits};
 
 /// Mean squared length that source poses are scaled to. See [`scaled`].
-pub const SCALED_SQUARE: f64 = 10.0;
+pub const SCALED_SQUARE: f64 = 5.0;
 
 /// Scales a raw feature so that one noise variance serves all trackers.
 ///
 /// `spread_m` is the root mean square distance of the source poses from their mean: the square root
 /// of the mean squared length of a feature's places. A hand moves its points by centimetres, a body
 /// by decimetres, and a tracker has 3 points or 67; after scaling a typical source pose has the squared
-/// length [`SCALED_SQUARE`] for all of them, which against the noise of 0.05 and the unit prior lets a
-/// pair be met to about 0.5 %. Velocities are scaled alike, so w keeps its meaning.
+/// length [`SCALED_SQUARE`] for all of them: a hundred times the noise of 0.05, so that pairs are met to
+/// about a hundredth. Velocities are scaled alike, so w keeps its meaning.
 pub fn scaled(feature: &[f64], spread_m: f64, out: &mut [f64]) {
     let scale = SCALED_SQUARE.sqrt() / spread_m;
     for (out, x) in out.iter_mut().zip(feature) {
