@@ -159,7 +159,9 @@ impl PoseMap {
         scaled(feature, self.spread_m, &mut self.x);
         let uncertainty = self.regression.uncertainty();
         let q = uncertainty.q(&self.x, &mut self.scratch);
-        (q, q / uncertainty.prior(&self.x))
+        let prior = uncertainty.prior(&self.x);
+        // A pose too far away for its square to be a number teaches nothing.
+        (q, if prior.is_finite() { q / prior } else { 0.0 })
     }
 
     /// Root velocity (forwards, left; m/s) while the pose changes by `change` (per joint and second).

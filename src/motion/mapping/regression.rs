@@ -95,14 +95,14 @@ impl Uncertainty {
                         .map(|(a, b)| a * b)
                         .sum();
                 }
-                (prior - solved_square(factor.l_dirty(), &mut scratch[..n])).clamp(0.0, prior)
+                bounded(prior - solved_square(factor.l_dirty(), &mut scratch[..n]), prior)
             }
             Form::Primal(factor) => {
                 let n = self.inputs + 1;
                 for (out, value) in scratch[..n].iter_mut().zip(with_bias(x)) {
                     *out = value;
                 }
-                solved_square(factor.l_dirty(), &mut scratch[..n]).clamp(0.0, prior)
+                bounded(solved_square(factor.l_dirty(), &mut scratch[..n]), prior)
             }
         }
     }
@@ -110,6 +110,15 @@ impl Uncertainty {
     /// q at `x` before anything was taught.
     pub fn prior(&self, x: &[f64]) -> f64 {
         with_bias(x).map(|v| v * v).sum()
+    }
+}
+
+/// `q` within 0 and its prior, rounding or not; 0 where numbers overflow.
+fn bounded(q: f64, prior: f64) -> f64 {
+    if prior.is_finite() {
+        q.max(0.0).min(prior)
+    } else {
+        0.0
     }
 }
 
