@@ -153,6 +153,10 @@ impl FrontEnd {
         if set.gestures.is_empty() && features.is_empty() {
             return Err(FrontEndError::NoGestures);
         }
+        let features = features
+            .iter()
+            .map(|spec| PoseFeatures::new(spec, stream))
+            .collect::<Result<_, _>>()?;
         if stream.dim != set.header.dim {
             return Err(FrontEndError::Dimension {
                 found: stream.dim,
@@ -220,10 +224,7 @@ impl FrontEnd {
             channels: vec![0.0; channel_names.len()],
             channel_names,
             last_t: None,
-            features: features
-                .iter()
-                .map(|spec| PoseFeatures::new(spec, stream))
-                .collect::<Result<_, _>>()?,
+            features,
         })
     }
 
