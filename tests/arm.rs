@@ -22,9 +22,8 @@ fn arm() -> Character {
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let (ma, mb) = (mean(a), mean(b));
-    let sum = |f: fn(f64, f64) -> f64| -> f64 {
-        a.iter().zip(b).map(|(a, b)| f(a - ma, b - mb)).sum()
-    };
+    let sum =
+        |f: fn(f64, f64) -> f64| -> f64 { a.iter().zip(b).map(|(a, b)| f(a - ma, b - mb)).sum() };
     sum(|a, b| a * b) / (sum(|a, _| a * a) * sum(|_, b| b * b)).sqrt()
 }
 
@@ -41,21 +40,67 @@ fn a_broken_map_or_class_is_refused_with_file_and_key() {
     let check = |file: &str, from: &str, to: &str, parts: &[&str]| {
         let before = folder.read(file);
         folder.edit(file, from, to);
-        refused(run_virtual(&[&folder.text("arm.toml")]), 2, parts);
+        let played = if file == "quadruped.toml" {
+            file
+        } else {
+            "arm.toml"
+        };
+        refused(run_virtual(&[&folder.text(played)]), 2, parts);
         folder.write(file, &before);
     };
     let map = "maps/arm.toml";
     check(map, "spread_m", "spred_m", &["maps/arm.toml", "spred_m"]);
     check(map, "version = 1", "version = 7", &["version", "found 7"]);
     check(map, "\"joint3\"", "\"joint33\"", &["joint33"]);
-    check(map, "\"gripper\" = ", "\"griper\" = ", &["griper", "did you mean \"gripper\"?"]);
-    check(map, "anchor = \"head\"", "anchor = \"hed\"", &["source.global.anchor", "hed"]);
-    check(map, "\"right_hand\"", "\"right_foot\"", &["no point right_foot", "map learn"]);
-    check(map, "smoothing_s = 0.1", "smoothing_s = -1.0", &["options.smoothing_s", "-1"]);
-    check(map, "\"joint1\" = -0.55", "\"joint1\" = -2.95", &["pair 1", "outside its limits"]);
+    check(
+        map,
+        "\"gripper\" = ",
+        "\"griper\" = ",
+        &["griper", "did you mean \"gripper\"?"],
+    );
+    check(
+        map,
+        "anchor = \"head\"",
+        "anchor = \"hed\"",
+        &["source.global.anchor", "hed"],
+    );
+    check(
+        map,
+        "\"right_hand\"",
+        "\"right_foot\"",
+        &["no point right_foot", "map learn"],
+    );
+    check(
+        map,
+        "smoothing_s = 0.1",
+        "smoothing_s = -1.0",
+        &["options.smoothing_s", "-1"],
+    );
+    check(
+        map,
+        "\"joint1\" = -0.55",
+        "\"joint1\" = -2.95",
+        &["pair 1", "outside its limits"],
+    );
     let config = "arm.toml";
-    check(config, "maps/arm.toml\"", "maps/leg.toml\"", &["arm.toml:", "class.map", "leg.toml"]);
-    check(config, "map = \"maps/arm.toml\"", "", &["class.gesture", "needs a gesture"]);
+    check(
+        config,
+        "maps/arm.toml\"",
+        "maps/leg.toml\"",
+        &["arm.toml:", "class.map", "leg.toml"],
+    );
+    check(
+        config,
+        "map = \"maps/arm.toml\"",
+        "",
+        &["arm.toml", "one [[gesture]] file", "a class with `map`"],
+    );
+    check(
+        "quadruped.toml",
+        "gesture = \"drum\"\n",
+        "",
+        &["class.gesture", "needs a gesture"],
+    );
     check(
         config,
         "map = \"maps/arm.toml\"",
@@ -71,7 +116,13 @@ fn the_arm_follows_the_dancer() {
     let file = folder.text("targets.csv");
     let ended = run_virtual(&["configs/arm.toml", "--targets", &file, "--json"]).expect(0);
     let summary = ended.json();
-    for quiet in ["envelope_cycles", "overruns", "bus_errors", "poses_lost_cycles", "samples_refused"] {
+    for quiet in [
+        "envelope_cycles",
+        "overruns",
+        "bus_errors",
+        "poses_lost_cycles",
+        "samples_refused",
+    ] {
         assert_eq!(summary[quiet], 0, "{quiet}: {summary}");
     }
     let targets = Targets::read(std::path::Path::new(&file));
@@ -85,7 +136,14 @@ fn the_arm_follows_the_dancer() {
     let begins_s = character.safety.ramp_s;
     let rows = || (targets.rows.iter().enumerate()).filter(|(k, _)| (600..4300).contains(k));
     for (what, point, axis, joint, sign, least) in [
-        ("right hand to the side, arm to the side", 2, 0, 0, 1.0, 0.95),
+        (
+            "right hand to the side, arm to the side",
+            2,
+            0,
+            0,
+            1.0,
+            0.95,
+        ),
         ("right hand up, forearm up", 2, 1, 2, -1.0, 0.9),
         ("left hand up, gripper open", 1, 1, 4, 1.0, 0.95),
     ] {
@@ -94,13 +152,21 @@ fn the_arm_follows_the_dancer() {
             .map(|k| {
                 let lag_s = f64::from(k) / RATE_HZ;
                 let shown: Vec<f64> = rows()
-                    .map(|(k, _)| hand(&samples, point, axis, k as f64 / RATE_HZ - begins_s - lag_s))
+                    .map(|(k, _)| {
+                        hand(&samples, point, axis, k as f64 / RATE_HZ - begins_s - lag_s)
+                    })
                     .collect();
                 (correlation(&shown, &moved), lag_s)
             })
-            .fold((-1.0, 0.0), |best: (f64, f64), next| if next.0 > best.0 { next } else { best });
+            .fold(
+                (-1.0, 0.0),
+                |best: (f64, f64), next| if next.0 > best.0 { next } else { best },
+            );
         println!("{what}: correlation {best:.3}, {lag_s:.3} s behind");
-        assert!(best > least, "{what}: correlation {best:.3}, at least {least} expected");
+        assert!(
+            best > least,
+            "{what}: correlation {best:.3}, at least {least} expected"
+        );
         assert!(lag_s < 0.2, "{what}: {lag_s} s behind");
     }
 }
@@ -110,8 +176,13 @@ fn every_shipped_character_plays_to_its_end() {
     let names: Vec<String> = shipped().into_iter().map(|(name, _)| name).collect();
     assert!(names.len() >= 2, "{names:?}");
     for name in names {
-        let summary = run_virtual(&[&format!("configs/{name}"), "--json"]).expect(0).json();
-        assert_eq!(summary["ending"], "performance complete", "{name}: {summary}");
+        let summary = run_virtual(&[&format!("configs/{name}"), "--json"])
+            .expect(0)
+            .json();
+        assert_eq!(
+            summary["ending"], "performance complete",
+            "{name}: {summary}"
+        );
         assert_eq!(summary["envelope_cycles"], 0, "{name}: {summary}");
     }
 }
@@ -126,7 +197,9 @@ fn lost_poses_bring_the_arm_to_rest_and_it_eases_in_when_they_return() {
     let mut play = |player: &mut Player, until_s: f64, heard: bool| {
         let mut fastest: f64 = 0.0;
         while player.t_s() < until_s && player.step(heard) {
-            watch.see(player.positions()).unwrap_or_else(|e| panic!("{e}"));
+            watch
+                .see(player.positions())
+                .unwrap_or_else(|e| panic!("{e}"));
             fastest = fastest.max(watch.fastest_rad_s());
             acted += player.puppet.targets().held_back;
         }
@@ -141,10 +214,16 @@ fn lost_poses_bring_the_arm_to_rest_and_it_eases_in_when_they_return() {
     assert!(resting < 0.02, "still moving at {resting} rad/s");
     let resumed = play(&mut player, begins_s + 12.0, true);
     assert!(resumed > 0.5, "poses are back, joints at {resumed} rad/s");
-    let way = before.iter().zip(player.positions()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let way = before
+        .iter()
+        .zip(player.positions())
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
     assert_eq!(player.puppet.stage(), Stage::Playing);
     assert_eq!(acted, 0, "the envelope acted");
-    println!("coasting {held:.2}, easing {eased:.2}, resting {resting:.4}, resumed {resumed:.2} rad/s, {way:.2} rad away");
+    println!(
+        "coasting {held:.2}, easing {eased:.2}, resting {resting:.4}, resumed {resumed:.2} rad/s, {way:.2} rad away"
+    );
 }
 
 #[test]
@@ -153,10 +232,22 @@ fn a_gesture_can_lead_into_a_map_and_out_of_it() {
     let folder = Folder::of_configs();
     let at = |name: &str| folder.text(name);
     let learned = handwave(&[
-        "map", "learn", "--poses", &at("performances/drum_and_splay.jsonl"),
-        "--urdf", &at("robots/pup.urdf"), "--clip", &at("clips/bow.json"),
-        "--pair", "37.8=bow@0", "--pair", "39=bow@0.5", "--pair", "41=bow@1",
-        "--out", &at("maps/bow.toml"),
+        "map",
+        "learn",
+        "--poses",
+        &at("performances/drum_and_splay.jsonl"),
+        "--urdf",
+        &at("robots/pup.urdf"),
+        "--clip",
+        &at("clips/bow.json"),
+        "--pair",
+        "37.8=bow@0",
+        "--pair",
+        "39=bow@0.5",
+        "--pair",
+        "41=bow@1",
+        "--out",
+        &at("maps/bow.toml"),
     ]);
     learned.expect(0);
     folder.edit(
@@ -164,13 +255,26 @@ fn a_gesture_can_lead_into_a_map_and_out_of_it() {
         "clip = [{ file = \"clips/bow.json\" }]",
         "map = \"maps/bow.toml\"",
     );
-    let ended = run_virtual(&[&at("quadruped.toml"), "--targets", &at("t.csv"), "--json"]).expect(0);
+    let ended =
+        run_virtual(&[&at("quadruped.toml"), "--targets", &at("t.csv"), "--json"]).expect(0);
     let summary = ended.json();
     assert!(summary["transitions"].as_u64() >= Some(2), "{summary}");
     assert_eq!(summary["envelope_cycles"], 0, "{summary}");
     // Without a gesture it would have to be where the graph starts.
-    folder.edit("quadruped.toml", "gesture = \"splay\"        # non-cyclic", "# non-cyclic");
-    refused(run_virtual(&[&at("quadruped.toml")]), 2, &["class.map", "graph.start"]);
-    folder.edit("quadruped.toml", "start = \"locomotion\"", "start = \"bow\"");
+    folder.edit(
+        "quadruped.toml",
+        "gesture = \"splay\"        # non-cyclic",
+        "# non-cyclic",
+    );
+    refused(
+        run_virtual(&[&at("quadruped.toml")]),
+        2,
+        &["class.map", "graph.start"],
+    );
+    folder.edit(
+        "quadruped.toml",
+        "start = \"locomotion\"",
+        "start = \"bow\"",
+    );
     run_virtual(&[&at("quadruped.toml")]).expect(0);
 }

@@ -12,7 +12,10 @@ struct Numbers(u64);
 
 impl Numbers {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
@@ -47,7 +50,13 @@ fn pair(label: &str, source: Vec<f64>, frame: usize) -> Pair {
 }
 
 fn learn(pairs: &[Pair]) -> Result<PoseMap, MappingError> {
-    PoseMap::learn(pairs, 0.1, volume(), RootMap::default(), MapOptions::default())
+    PoseMap::learn(
+        pairs,
+        0.1,
+        volume(),
+        RootMap::default(),
+        MapOptions::default(),
+    )
 }
 
 #[track_caller]
@@ -70,41 +79,74 @@ fn degenerate_pairs_are_refused_by_name() {
 
     let mut twice = pairs.clone();
     twice[3].source = twice[1].source.clone();
-    refused(&twice, &["pair 1 (at 1 s)", "pair 3 (at 3 s)", "same source pose"]);
+    refused(
+        &twice,
+        &["pair 1 (at 1 s)", "pair 3 (at 3 s)", "same source pose"],
+    );
 
     let mut constant = pairs.clone();
     for pair in &mut constant {
         pair.source = vec![0.2; 12];
     }
-    refused(&constant, &["pair 0 (at 0 s) to pair 3 (at 3 s)", "does not change"]);
+    refused(
+        &constant,
+        &["pair 0 (at 0 s) to pair 3 (at 3 s)", "does not change"],
+    );
 
     let mut broken = pairs.clone();
     broken[2].source[5] = f64::NAN;
-    refused(&broken, &["pair 2 (at 2 s): source pose", "number 5 is NaN"]);
+    refused(
+        &broken,
+        &["pair 2 (at 2 s): source pose", "number 5 is NaN"],
+    );
     broken = pairs.clone();
     broken[2].target[4] = f64::INFINITY;
-    refused(&broken, &["pair 2 (at 2 s): target pose", "number 4 is inf"]);
+    refused(
+        &broken,
+        &["pair 2 (at 2 s): target pose", "number 4 is inf"],
+    );
     broken = pairs.clone();
     broken[1].source.pop();
-    refused(&broken, &["pair 1 (at 1 s): source pose", "found 11", "expected 12"]);
+    refused(
+        &broken,
+        &["pair 1 (at 1 s): source pose", "found 11", "expected 12"],
+    );
     broken = pairs.clone();
     broken[3].target.push(0.0);
-    refused(&broken, &["pair 3 (at 3 s): target pose", "found 6", "expected 5"]);
+    refused(
+        &broken,
+        &["pair 3 (at 3 s): target pose", "found 6", "expected 5"],
+    );
 
     let still = vec![vec![0.0; 12]; 30];
-    let message = spread_m("take.csv", &still).expect_err("stands still").to_string();
-    assert!(message.contains("take.csv") && message.contains("does not change"), "{message}");
+    let message = spread_m("take.csv", &still)
+        .expect_err("stands still")
+        .to_string();
+    assert!(
+        message.contains("take.csv") && message.contains("does not change"),
+        "{message}"
+    );
     for (frames, part) in [
         (vec![], "0 target frames"),
         (vec![vec![0.3; 5]; 10], "do not move"),
         (vec![vec![0.3; 5], vec![0.1; 4]], "target frame 1: found 4"),
-        (vec![vec![0.3; 5], vec![f64::NAN; 5]], "target frame 1: number 0"),
+        (
+            vec![vec![0.3; 5], vec![f64::NAN; 5]],
+            "target frame 1: number 0",
+        ),
     ] {
-        let message = LatentVolume::learn(&frames, 50).expect_err(part).to_string();
+        let message = LatentVolume::learn(&frames, 50)
+            .expect_err(part)
+            .to_string();
         assert!(message.contains(part), "{message}");
     }
-    let narrow = volume().within(&[0.5; JOINTS], &[0.6; JOINTS]).expect_err("mean outside");
-    assert!(narrow.to_string().contains("outside its limits"), "{narrow}");
+    let narrow = volume()
+        .within(&[0.5; JOINTS], &[0.6; JOINTS])
+        .expect_err("mean outside");
+    assert!(
+        narrow.to_string().contains("outside its limits"),
+        "{narrow}"
+    );
 }
 
 /// Eq. 8.3 as it is written, with the big matrix.
@@ -138,14 +180,24 @@ fn dual_and_primal_form_are_eq_8_3() {
             map.predict(&x, &mut found);
             for (found, mean) in found.iter().zip(&mean) {
                 let error = (found - mean).abs();
-                assert!(error < 1e-9, "{inputs} inputs, {pairs} pairs: mean off by {error}");
+                assert!(
+                    error < 1e-9,
+                    "{inputs} inputs, {pairs} pairs: mean off by {error}"
+                );
             }
             let error = (uncertainty.q(&x, &mut scratch) - q).abs();
-            assert!(error < 1e-9 * (1.0 + q), "{inputs} inputs, {pairs} pairs: q off by {error}");
+            assert!(
+                error < 1e-9 * (1.0 + q),
+                "{inputs} inputs, {pairs} pairs: q off by {error}"
+            );
         }
     }
     let blank = Uncertainty::new(4, &[], 0.05);
-    assert_eq!(blank.q(&[1.0, 2.0, 0.0, 0.0], &mut []), 6.0, "the prior: x^T x and the bias");
+    assert_eq!(
+        blank.q(&[1.0, 2.0, 0.0, 0.0], &mut []),
+        6.0,
+        "the prior: x^T x and the bias"
+    );
 }
 
 /// A source that moves in `modes` ways, its feature (places and velocities) and a target linear in it.
@@ -186,8 +238,7 @@ fn a_linear_relation_is_recovered_from_eight_pairs() {
     for points in [3, 6, 21, 67] {
         let relation = Linear::new(points, 3);
         let times: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.033).collect();
-        let (features, targets): (Vec<_>, Vec<_>) =
-            times.iter().map(|t| relation.at(*t)).unzip();
+        let (features, targets): (Vec<_>, Vec<_>) = times.iter().map(|t| relation.at(*t)).unzip();
         let spread = spread_m("the source", &features).expect("it moves");
         // As a user with `map suggest`: each pair where the map is least certain.
         let scale = |feature: &Vec<f64>| {
@@ -215,12 +266,23 @@ fn a_linear_relation_is_recovered_from_eight_pairs() {
         let (mut error, mut variance) = (0.0, 0.0);
         for (feature, target) in features.iter().zip(&targets) {
             map.apply(feature, &mut pose);
-            error += pose.iter().zip(target).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            error += pose
+                .iter()
+                .zip(target)
+                .map(|(a, b)| (a - b).powi(2))
+                .sum::<f64>();
             variance += target.iter().map(|b| (b - 0.2).powi(2)).sum::<f64>();
         }
         let share = (error / variance).sqrt();
-        println!("{points} points: error {:.3} % of the motion", 100.0 * share);
-        assert!(share < 0.01, "{points} points: error {:.2} %, bound 1 %", 100.0 * share);
+        println!(
+            "{points} points: error {:.3} % of the motion",
+            100.0 * share
+        );
+        assert!(
+            share < 0.01,
+            "{points} points: error {:.2} %, bound 1 %",
+            100.0 * share
+        );
     }
 }
 
@@ -232,7 +294,11 @@ fn axes_are_orthonormal_ordered_and_hold_what_they_say() {
     assert!(volume.kept > 0.999_999, "kept {}", volume.kept);
     let short = LatentVolume::learn(&frames, 2).expect("frames that move");
     assert_eq!(short.dimensions(), 2);
-    assert!(short.kept > 0.97 && short.kept < 0.9999, "two of three keep {}", short.kept);
+    assert!(
+        short.kept > 0.97 && short.kept < 0.9999,
+        "two of three keep {}",
+        short.kept
+    );
     // A mesh: more coordinates than frames. The other Gram matrix gives the same.
     let wide: Vec<Vec<f64>> = frames[..4].to_vec();
     let wide = LatentVolume::learn(&wide, 50).expect("frames that move");
@@ -241,7 +307,10 @@ fn axes_are_orthonormal_ordered_and_hold_what_they_say() {
             for (b, second) in v.axes.chunks(JOINTS).enumerate() {
                 let product: f64 = first.iter().zip(second).map(|(x, y)| x * y).sum();
                 let expected = if a == b { 1.0 } else { 0.0 };
-                assert!((product - expected).abs() < 1e-6, "axes {a} and {b}: {product}");
+                assert!(
+                    (product - expected).abs() < 1e-6,
+                    "axes {a} and {b}: {product}"
+                );
             }
         }
     }
@@ -252,7 +321,10 @@ fn axes_are_orthonormal_ordered_and_hold_what_they_say() {
         let unclipped = coefficients.clone();
         volume.clip(&mut coefficients);
         for (c, u) in coefficients.iter().zip(&unclipped) {
-            assert!((c - u).abs() < 1e-12, "a target frame lies outside its own volume: {u}");
+            assert!(
+                (c - u).abs() < 1e-12,
+                "a target frame lies outside its own volume: {u}"
+            );
         }
         volume.back(&coefficients, &mut back);
         for (a, b) in back.iter().zip(frame) {
@@ -268,14 +340,22 @@ fn travel_follows_the_change_of_pose() {
     // Absolute values: a leg going back carries the body forwards as one going forth.
     let truth = [[0.3, 0.1, 0.05], [0.0, 0.02, -0.01]];
     let dot = |w: &[f64; 3], v: &[f64]| -> f64 { w.iter().zip(v).map(|(w, v)| w * v.abs()).sum() };
-    let velocities: Vec<[f64; 2]> =
-        speeds.iter().map(|v| [dot(&truth[0], v), dot(&truth[1], v)]).collect();
+    let velocities: Vec<[f64; 2]> = speeds
+        .iter()
+        .map(|v| [dot(&truth[0], v), dot(&truth[1], v)])
+        .collect();
     let map = RootMap::learn(&speeds, &velocities).expect("good rows");
     for (found, truth) in map.weights.iter().zip(truth.iter().flatten()) {
-        assert!((found - truth).abs() < 10.0 * ROOT_RIDGE.powi(2), "{found} for {truth}");
+        assert!(
+            (found - truth).abs() < 10.0 * ROOT_RIDGE.powi(2),
+            "{found} for {truth}"
+        );
     }
     let [forward, left] = map.velocity(&[-1.0, 0.0, 0.0]);
-    assert!((forward - 0.3).abs() < 1e-5 && left.abs() < 1e-5, "{forward} {left}");
+    assert!(
+        (forward - 0.3).abs() < 1e-5 && left.abs() < 1e-5,
+        "{forward} {left}"
+    );
     let still = RootMap::learn(&speeds, &vec![[0.0; 2]; 300]).expect("good rows");
     assert_eq!(still.velocity(&[1.0, 1.0, 1.0]), [0.0; 2]);
 }

@@ -393,7 +393,7 @@ fn gesture_set(
             return Err(at.key(
                 "gesture",
                 format!(
-                    "{} gesture files are named; give one [[gesture]] file, which may define many gestures",
+                    "{} gesture files are named; give one [[gesture]] file, which may define many gestures (only a character with a class with `map` may be without)",
                     other.len()
                 ),
             ));

@@ -171,7 +171,11 @@ pub fn load_map(
     if let VolumeSource::Clips(paths) = &file.volume {
         let folder = Path::new(path).parent().unwrap_or(Path::new(""));
         for clip in paths {
-            clips.push(clip_of(files, &folder.join(clip).to_string_lossy(), joints)?);
+            clips.push(clip_of(
+                files,
+                &folder.join(clip).to_string_lossy(),
+                joints,
+            )?);
         }
     }
     build_map(&name, &file, &clips, lower, upper)

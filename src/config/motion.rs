@@ -98,7 +98,9 @@ pub(super) fn class_parts(
         }
         let gesture = gesture_index(class, gestures, at)?;
         if let Some(path) = &class.map {
-            parts.push(direct_parts(files, file, class, path, joints, limits, gesture, at)?);
+            parts.push(direct_parts(
+                files, file, class, path, joints, limits, gesture, at,
+            )?);
             continue;
         }
         let (Some(gesture), Some(wanted)) = (gesture, &class.gesture) else {

@@ -46,8 +46,8 @@
 //!   the other. Turning and shape are blended apart, as a hand turns between two postures without
 //!   shrinking half-way. A loop that follows a loop over the same stretch takes over its phase.
 
-use crate::base::SplitMix;
 use super::{GlobalFit, GlobalOptions, PoseError, PoseHeader, PoseSample, Recording};
+use crate::base::SplitMix;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -4,7 +4,7 @@ use super::shelf::{Shelf, SourceArgs, limits, robot};
 use crate::cli::{ExitStatus, Failure, say};
 use crate::config::map::{Lesson, MapParts, build_map, teach};
 use crate::motion::mapping::file::VolumeSource;
-use crate::motion::mapping::{MapFile, MOST_AXES, NOISE_VARIANCE, learn_volume};
+use crate::motion::mapping::{MOST_AXES, MapFile, NOISE_VARIANCE, learn_volume};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -28,13 +28,18 @@ pub(super) struct LearnArgs {
     #[arg(long)]
     out: PathBuf,
     /// sigma^2: more smooths the map, less meets the pairs closer
-    #[arg(long, value_name = "VARIANCE", default_value_t = NOISE_VARIANCE)]
+    #[arg(long, value_name = "VARIANCE", default_value_t = NOISE_VARIANCE, allow_negative_numbers = true)]
     noise: f64,
     /// Most principal axes of the target
     #[arg(long, value_name = "D", default_value_t = MOST_AXES)]
     components: usize,
     /// Turn of the root per turn of the performer, for a body that can turn
-    #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "R",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
     yaw_ratio: f64,
     /// Print the report as one JSON object
     #[arg(long)]
@@ -77,8 +82,7 @@ pub(super) fn learn(args: &LearnArgs) -> Result<ExitStatus, Failure> {
     // What is reported is what a reader of the file will get, rounding included.
     let text = file.to_toml();
     let name = args.out.display().to_string();
-    let file =
-        MapFile::from_toml(&text).map_err(|e| Failure::input(format!("{name}: {e}")))?;
+    let file = MapFile::from_toml(&text).map_err(|e| Failure::input(format!("{name}: {e}")))?;
     let (lower, upper) = limits(model.as_ref(), shelf.joints.len());
     let mut parts = build_map(&name, &file, &[], &lower, &upper).map_err(Failure::input)?;
     std::fs::write(&args.out, text).map_err(|e| {
@@ -102,12 +106,12 @@ fn report(json: bool, name: &str, file: &MapFile, parts: &mut MapParts) -> Resul
         let (q, _) = parts.map.uncertainty(&feature);
         let errors = || pose.iter().zip(&pair.pose).map(|(a, b)| (a - b).abs());
         let rms = (errors().map(|e| e * e).sum::<f64>() / pose.len() as f64).sqrt();
-        let (worst, joint) =
-            errors()
-                .zip(&file.joints)
-                .fold((0.0, ""), |most: (f64, &str), (e, joint)| {
-                    if e > most.0 { (e, joint) } else { most }
-                });
+        let (worst, joint) = errors().zip(&file.joints).fold(
+            (0.0, ""),
+            |most: (f64, &str), (e, joint)| {
+                if e > most.0 { (e, joint) } else { most }
+            },
+        );
         rows.push((pair.name.clone(), rms, worst, joint.to_owned(), q));
     }
     if json {
@@ -139,7 +143,9 @@ fn report(json: bool, name: &str, file: &MapFile, parts: &mut MapParts) -> Resul
         "pair", "residual [rad]", "worst [rad]"
     ));
     for (pair, rms, worst, joint, _) in &rows {
-        say(format_args!("{pair:<36} {rms:>14.4} {worst:>16.4}  {joint}"));
+        say(format_args!(
+            "{pair:<36} {rms:>14.4} {worst:>16.4}  {joint}"
+        ));
     }
     Ok(())
 }

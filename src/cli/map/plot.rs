@@ -24,8 +24,14 @@ pub(super) fn curves(
         low - margin..high + margin
     };
     let mut text = String::new();
-    draw(&mut text, title, (x, y), (range(|p| p.0), range(|p| p.1)), curves)
-        .map_err(|e| e.to_string())?;
+    draw(
+        &mut text,
+        title,
+        (x, y),
+        (range(|p| p.0), range(|p| p.1)),
+        curves,
+    )
+    .map_err(|e| e.to_string())?;
     Ok(text)
 }
 
@@ -48,7 +54,10 @@ fn draw(
     for (index, (name, points)) in curves.iter().enumerate() {
         let colour = Palette99::pick(index).to_rgba();
         chart
-            .draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))?
+            .draw_series(LineSeries::new(
+                points.iter().copied(),
+                colour.stroke_width(2),
+            ))?
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
     }

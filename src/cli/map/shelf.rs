@@ -25,10 +25,20 @@ pub(super) struct SourceArgs {
     #[arg(long, value_name = "BOOL")]
     height: Option<bool>,
     /// w: weight of velocities, s
-    #[arg(long, value_name = "S", default_value_t = 0.1)]
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.1,
+        allow_negative_numbers = true
+    )]
     velocity_weight: f64,
     /// Standard deviation of the one-sided smoothing, s
-    #[arg(long, value_name = "S", default_value_t = 0.1)]
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.1,
+        allow_negative_numbers = true
+    )]
     smoothing: f64,
 }
 
@@ -49,7 +59,9 @@ impl SourceArgs {
             ("--smoothing", self.smoothing, 2.0),
         ] {
             if !(value >= 0.0 && value <= most) {
-                return Err(Failure::input(format!("{key} {value} is not in 0..{most} s")));
+                return Err(Failure::input(format!(
+                    "{key} {value} is not in 0..{most} s"
+                )));
             }
         }
         let name = self.poses.display().to_string();
@@ -63,13 +75,9 @@ impl SourceArgs {
             yaw: self.yaw,
             height: self.height,
         };
-        let spec = FeatureSpec::of_recording(
-            &recording,
-            global,
-            self.velocity_weight,
-            self.smoothing,
-        )
-        .map_err(|e| failed(&e))?;
+        let spec =
+            FeatureSpec::of_recording(&recording, global, self.velocity_weight, self.smoothing)
+                .map_err(|e| failed(&e))?;
         let all = spec.features(&recording).map_err(|e| failed(&e))?;
         let times_s = all.iter().map(|(i, _)| recording.samples[*i].t).collect();
         let features: Vec<Vec<f64>> = all.into_iter().map(|(_, feature)| feature).collect();
@@ -250,8 +258,7 @@ pub(super) fn robot(path: Option<&Path>) -> Result<Option<RobotModel>, Failure> 
     let name = path.display();
     let text = std::fs::read_to_string(path)
         .map_err(|e| Failure::input(format!("{name}: cannot be read: {e}")))?;
-    let model =
-        RobotModel::from_urdf(&text).map_err(|e| Failure::input(format!("{name}: {e}")))?;
+    let model = RobotModel::from_urdf(&text).map_err(|e| Failure::input(format!("{name}: {e}")))?;
     Ok(Some(model))
 }
 

@@ -30,7 +30,7 @@ pub(super) struct StudyArgs {
     #[arg(long, default_value_t = 10)]
     splits: usize,
     /// sigma^2 of the regression
-    #[arg(long, value_name = "VARIANCE", default_value_t = NOISE_VARIANCE)]
+    #[arg(long, value_name = "VARIANCE", default_value_t = NOISE_VARIANCE, allow_negative_numbers = true)]
     noise: f64,
     /// Seed of the draws
     #[arg(long, default_value_t = 1)]
@@ -48,7 +48,10 @@ pub(super) struct StudyArgs {
 
 pub(super) fn study(args: &StudyArgs) -> Result<ExitStatus, Failure> {
     if !(2..=1000).contains(&args.splits) {
-        return Err(Failure::input(format!("--splits {} is not in 2..1000", args.splits)));
+        return Err(Failure::input(format!(
+            "--splits {} is not in 2..1000",
+            args.splits
+        )));
     }
     let source = args.source.read()?;
     let mut shelf = Shelf::of(None);
@@ -98,8 +101,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<ExitStatus, Failure> {
         noise_variance: args.noise,
         seed: args.seed,
     };
-    let scores =
-        run_study(&pairs, source.spread_m, &frames, &plan).map_err(Failure::input)?;
+    let scores = run_study(&pairs, source.spread_m, &frames, &plan).map_err(Failure::input)?;
     if args.json {
         for s in &scores {
             let row = serde_json::json!({
@@ -166,8 +168,13 @@ fn svg(plan: &StudyPlan, scores: &[Score]) -> Result<String, Failure> {
             (variant.name.clone(), points)
         })
         .collect();
-    super::plot::curves("Pose map: SNR by number of pairs", "training pairs", "SNR [dB]", &curves)
-        .map_err(|e| Failure::input(format!("the plot cannot be drawn: {e}")))
+    super::plot::curves(
+        "Pose map: SNR by number of pairs",
+        "training pairs",
+        "SNR [dB]",
+        &curves,
+    )
+    .map_err(|e| Failure::input(format!("the plot cannot be drawn: {e}")))
 }
 
 #[cfg(not(feature = "plot"))]

@@ -539,7 +539,13 @@ fn filed_pair(
         .iter()
         .map(|name| {
             let found = pair.pose.get(name).copied();
-            found.ok_or_else(|| value(&key, format!("no joint {name:?}"), "a number for each joint"))
+            found.ok_or_else(|| {
+                value(
+                    &key,
+                    format!("no joint {name:?}"),
+                    "a number for each joint",
+                )
+            })
         })
         .collect::<Result<_, _>>()?;
     check_row(&key, &pose, joints.len(), "one per joint")?;

@@ -155,6 +155,7 @@ impl DirectClass {
                     0.0
                 },
             },
+            uncertainty: self.uncertainty.1,
             ..Played::default()
         }
     }

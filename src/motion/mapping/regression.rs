@@ -55,8 +55,7 @@ impl Uncertainty {
             let x = design(taught, inputs);
             let dual = x.ncols() <= x.nrows();
             let matrix = if dual {
-                x.transpose() * &x
-                    + DMatrix::identity(x.ncols(), x.ncols()) * noise_variance
+                x.transpose() * &x + DMatrix::identity(x.ncols(), x.ncols()) * noise_variance
             } else {
                 &x * x.transpose() / noise_variance + DMatrix::identity(x.nrows(), x.nrows())
             };
@@ -95,7 +94,10 @@ impl Uncertainty {
                         .map(|(a, b)| a * b)
                         .sum();
                 }
-                bounded(prior - solved_square(factor.l_dirty(), &mut scratch[..n]), prior)
+                bounded(
+                    prior - solved_square(factor.l_dirty(), &mut scratch[..n]),
+                    prior,
+                )
             }
             Form::Primal(factor) => {
                 let n = self.inputs + 1;

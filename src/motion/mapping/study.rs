@@ -172,8 +172,7 @@ pub fn study(
                     .iter()
                     .map(|x| answer(variant, &volume, &map, x))
                     .collect();
-                let truths: Vec<&[f64]> =
-                    judging.iter().map(|k| &pairs[*k].target[..]).collect();
+                let truths: Vec<&[f64]> = judging.iter().map(|k| &pairs[*k].target[..]).collect();
                 draws_db.push(snr_db(&answers, &truths));
             }
             let mean = draws_db.iter().sum::<f64>() / draws_db.len() as f64;

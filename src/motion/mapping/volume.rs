@@ -236,9 +236,13 @@ fn principal_axes(centred: &DMatrix<f64>) -> Vec<(f64, Vec<f64>)> {
                 vector.into_owned()
             };
             // The sign of an axis is arbitrary; its largest part is made positive.
-            let largest = axis.iter().copied().fold(0.0, |m: f64, v| {
-                if v.abs() > m.abs() + 1e-12 { v } else { m }
-            });
+            let largest =
+                axis.iter().copied().fold(
+                    0.0,
+                    |m: f64, v| {
+                        if v.abs() > m.abs() + 1e-12 { v } else { m }
+                    },
+                );
             if largest < 0.0 {
                 axis.neg_mut();
             }
