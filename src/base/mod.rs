@@ -9,5 +9,4 @@ pub mod time;
 
 pub use angle::wrap_pi;
 pub use joints::JointState;
-pub use random::SplitMix;
 pub use time::{Clock, Time, VirtualClock};

@@ -134,6 +134,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         None => source::open(&character.source, &character.files),
     }
     .map_err(Failure::input)?;
+    if let Some(assumption) = reader.assumption() {
+        warn(format_args!("{assumption}"));
+    }
     let targets = options
         .targets
         .as_ref()

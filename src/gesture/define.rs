@@ -109,6 +109,11 @@ pub enum DefineError {
         /// The point.
         point: String,
     },
+    /// The recording has channels only.
+    #[error(
+        "the recording has no points, only channels; make points of those that the gesture moves: `handwave poses import RECORDING --as-points A,B,... --out POINTS.csv`"
+    )]
+    NoPoints,
     /// The set has a point that the recording does not have.
     #[error(
         "the recording has no point `{point}`, which the gesture file names; use recordings of one tracker, or start a new gesture file"
@@ -135,6 +140,9 @@ pub enum DefineError {
 
 /// The recording's frames in the order of the set's points, gaps filled.
 fn frames_of(set: &GestureSet, recording: &Recording) -> Result<Vec<Vec<[f64; 3]>>, DefineError> {
+    if recording.header.points.is_empty() {
+        return Err(DefineError::NoPoints);
+    }
     if recording.header.dim != set.header.dim {
         return Err(DefineError::Dimension {
             found: recording.header.dim,

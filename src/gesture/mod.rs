@@ -4,6 +4,7 @@
 //! what is left to one complex number (or a progression), and an [`Estimator`] reads amplitude,
 //! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
 
+mod channel;
 mod define;
 mod feature;
 mod file;
@@ -14,6 +15,7 @@ mod separability;
 mod set;
 mod wave;
 
+pub use channel::{DerivedChannel, DerivedChannelError, LONGEST_SMOOTHING_S};
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };
@@ -24,4 +26,7 @@ pub use period::{PeriodEstimate, find_period};
 pub use plane::{Plane, References};
 pub use separability::{Response, responses};
 pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
-pub use wave::{Estimator, EstimatorKind, GaborEstimator, LONGEST_GAP_S, PlanePoint, WaveEstimate};
+pub use wave::{
+    CorrelationEstimator, DirectEstimator, Estimator, EstimatorKind, FastEstimator, GaborEstimator,
+    LONGEST_GAP_S, LeastSquaresEstimator, PlanePoint, Shape, WaveEstimate,
+};

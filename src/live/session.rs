@@ -70,6 +70,7 @@ pub fn puppet(
         character.front_options,
         &character.features(),
     )?;
+    let front = character.with_channels(front)?;
     let mut animator = character.animator(&front)?;
     let end_pose = character.end_pose.clone().unwrap_or_else(|| {
         let mut rest = vec![0.0; character.joints.len()];

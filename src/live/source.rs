@@ -13,14 +13,16 @@ pub type SourceReader = PoseReader<Box<dyn BufRead + Send>>;
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// Not a source.
-    #[error("unknown pose source {found:?}. Allowed: file:PATH with a .jsonl or .csv pose stream")]
+    #[error(
+        "unknown pose source {found:?}. Allowed: file:PATH with a .jsonl, .csv or .bvh recording"
+    )]
     Unknown {
         /// As written.
         found: String,
     },
     /// A source that is known and not built in.
     #[error(
-        "pose source {found:?}: {kind} is not supported by this build; use file:PATH with a .jsonl or .csv pose stream"
+        "pose source {found:?}: {kind} is not supported by this build; use file:PATH with a .jsonl, .csv or .bvh recording"
     )]
     NotYet {
         /// As written.

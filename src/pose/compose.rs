@@ -47,7 +47,7 @@
 //!   shrinking half-way. A loop that follows a loop over the same stretch takes over its phase.
 
 use super::{GlobalFit, GlobalOptions, PoseError, PoseHeader, PoseSample, Recording};
-use crate::base::SplitMix;
+use crate::base::random::SplitMix;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -323,6 +323,10 @@ pub fn compose(path: &Path) -> Result<Recording, PoseError> {
         let key = format!("sources.{name}");
         let (recording, _) = Recording::read(&folder.join(relative))?;
         let never = |point: String| wrong(&key, format!("point `{point}` is never seen in it"));
+        if recording.header.points.is_empty() {
+            let what = "channels only; a performance is composed of points (`handwave poses import --as-points` makes points of channels)";
+            return Err(wrong(&key, what.into()));
+        }
         if recording.samples.len() < 2 {
             return Err(wrong(&key, "one sample only; at least 2 are needed".into()));
         }
@@ -449,14 +453,14 @@ fn play(
     sources: &[Source],
     seed: u64,
 ) -> Vec<PoseSample> {
-    let mut random = SplitMix(seed);
+    let mut random = SplitMix::new(seed);
     let mut samples: Vec<PoseSample> = Vec::new();
     let (mut t, mut begin) = (0.0, 0.0);
     for (index, segment) in segments.iter().enumerate() {
         let source = &sources[segment.source];
         // Step k leads from row k to row k + 1 of the recording.
         let steps = source.times.len() - 1;
-        let mut row = (random.next() % steps as u64) as usize;
+        let mut row = (random.bits() % steps as u64) as usize;
         let before = index.checked_sub(1).map(|before| &segments[before]);
         while t < begin + segment.duration - 1e-9 {
             let u = t - begin;

@@ -16,10 +16,12 @@
 //! - With fewer than three points and no anchor there is no body to speak of: nothing is removed.
 
 use super::PoseHeader;
+use serde::Deserialize;
 use std::f64::consts::PI;
 
 /// What is removed; `None` asks for the default of the point set.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct GlobalOptions {
     /// The point that is the body.
     pub anchor: Option<String>,

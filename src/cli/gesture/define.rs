@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Marks in a recording.
 #[derive(Args, Debug)]
 pub(super) struct DefineArgs {
-    /// The recording (.jsonl or .csv).
+    /// The recording (.jsonl, .csv or .bvh).
     #[arg(long)]
     poses: PathBuf,
     /// Name of the gesture.

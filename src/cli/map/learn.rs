@@ -1,6 +1,6 @@
 //! `handwave map learn`: from pairs to a map file, with a report.
 
-use super::shelf::{Shelf, SourceArgs, limits, robot};
+use super::shelf::{Shelf, SourceArgs, TargetArgs, limits, robot};
 use crate::cli::{ExitStatus, Failure, say};
 use crate::config::map::{Lesson, MapParts, build_map, teach};
 use crate::motion::mapping::file::VolumeSource;
@@ -15,15 +15,8 @@ pub(super) struct LearnArgs {
     /// Robot whose joints are mapped and whose limits hold (default: the joints of the first clip, no limits)
     #[arg(long)]
     urdf: Option<PathBuf>,
-    /// A clip of unlabelled target motion (repeatable)
-    #[arg(long, value_name = "CLIP")]
-    clip: Vec<PathBuf>,
-    /// A pair, T=CLIP@PHASE (repeatable)
-    #[arg(long, value_name = "T=CLIP@PHASE")]
-    pair: Vec<String>,
-    /// Pairs from a file, one a line
-    #[arg(long, value_name = "FILE")]
-    pairs: Option<PathBuf>,
+    #[command(flatten)]
+    targets: TargetArgs,
     /// Where to write the map
     #[arg(long)]
     out: PathBuf,
@@ -50,10 +43,7 @@ pub(super) fn learn(args: &LearnArgs) -> Result<ExitStatus, Failure> {
     let model = robot(args.urdf.as_deref())?;
     let source = args.source.read()?;
     let mut shelf = Shelf::of(model.as_ref());
-    for clip in &args.clip {
-        shelf.add(clip)?;
-    }
-    let wishes = shelf.wishes(&args.pair, args.pairs.as_deref())?;
+    let wishes = args.targets.read(&mut shelf)?;
     let mut lessons = Vec::new();
     for wish in &wishes {
         let name = format!("{} s = {}", wish.t_s, wish.target.text);

@@ -42,6 +42,30 @@ pub(super) struct SourceArgs {
     smoothing: f64,
 }
 
+/// Target clips and pairs.
+#[derive(Args, Debug)]
+pub(super) struct TargetArgs {
+    /// A clip of unlabelled target motion, which pairs may name without its path (repeatable)
+    #[arg(long, value_name = "CLIP")]
+    clip: Vec<PathBuf>,
+    /// A pair (repeatable)
+    #[arg(long, value_name = "T=CLIP@PHASE")]
+    pair: Vec<String>,
+    /// Pairs from a file, one a line
+    #[arg(long, value_name = "FILE")]
+    pairs: Option<PathBuf>,
+}
+
+impl TargetArgs {
+    /// Puts the clips on the shelf; returns the pairs.
+    pub(super) fn read(&self, shelf: &mut Shelf) -> Result<Vec<Wish>, Failure> {
+        for clip in &self.clip {
+            shelf.add(clip)?;
+        }
+        shelf.wishes(&self.pair, self.pairs.as_deref())
+    }
+}
+
 /// A source recording with its features.
 pub(super) struct Source {
     pub(super) recording: Recording,
@@ -146,7 +170,7 @@ impl Shelf {
     }
 
     /// Adds the clip at `path`; twice is once.
-    pub(super) fn add(&mut self, path: &Path) -> Result<usize, Failure> {
+    fn add(&mut self, path: &Path) -> Result<usize, Failure> {
         let name = path.display().to_string();
         if let Some(known) = self.names.iter().position(|n| *n == name) {
             return Ok(known);
@@ -199,7 +223,7 @@ impl Shelf {
     }
 
     /// `T=CLIP@PHASE`; a path is taken from `folder`.
-    pub(super) fn wish(&mut self, text: &str, folder: &Path) -> Result<Wish, Failure> {
+    fn wish(&mut self, text: &str, folder: &Path) -> Result<Wish, Failure> {
         let wrong = || {
             Failure::input(format!(
                 "pair {text:?}: write T=CLIP@PHASE such as 5.85=arm_keys@0.25, T in seconds of the recording"
@@ -214,11 +238,7 @@ impl Shelf {
     }
 
     /// Pairs of the command line and of a pairs file, in this order.
-    pub(super) fn wishes(
-        &mut self,
-        pairs: &[String],
-        file: Option<&Path>,
-    ) -> Result<Vec<Wish>, Failure> {
+    fn wishes(&mut self, pairs: &[String], file: Option<&Path>) -> Result<Vec<Wish>, Failure> {
         let mut wishes = Vec::new();
         for pair in pairs {
             wishes.push(self.wish(pair, Path::new(""))?);

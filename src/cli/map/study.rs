@@ -1,6 +1,6 @@
 //! `handwave map study`: the SNR of a map by number of pairs, against its variants.
 
-use super::shelf::{Shelf, SourceArgs};
+use super::shelf::{Shelf, SourceArgs, TargetArgs};
 use crate::cli::{ExitStatus, Failure, say};
 use crate::motion::mapping::study::{Score, StudyPlan, Variant, study as run_study};
 use crate::motion::mapping::{LatentVolume, MOST_AXES, NOISE_VARIANCE, Pair, target_frames};
@@ -11,15 +11,8 @@ use std::path::{Path, PathBuf};
 pub(super) struct StudyArgs {
     #[command(flatten)]
     source: SourceArgs,
-    /// A clip of unlabelled target motion (repeatable)
-    #[arg(long, value_name = "CLIP")]
-    clip: Vec<PathBuf>,
-    /// A pair, T=CLIP@PHASE (repeatable)
-    #[arg(long, value_name = "T=CLIP@PHASE")]
-    pair: Vec<String>,
-    /// Pairs from a file, one a line
-    #[arg(long, value_name = "FILE")]
-    pairs: Option<PathBuf>,
+    #[command(flatten)]
+    targets: TargetArgs,
     /// Numbers of training pairs (default: steps from 4 to four fifths of the pairs)
     #[arg(long, value_delimiter = ',', value_name = "N,...")]
     counts: Vec<usize>,
@@ -55,10 +48,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<ExitStatus, Failure> {
     }
     let source = args.source.read()?;
     let mut shelf = Shelf::of(None);
-    for clip in &args.clip {
-        shelf.add(clip)?;
-    }
-    let wishes = shelf.wishes(&args.pair, args.pairs.as_deref())?;
+    let wishes = args.targets.read(&mut shelf)?;
     if wishes.len() < 6 {
         return Err(Failure::input(format!(
             "{} pairs; a study draws from many: give 6 or more, 50 as in the thesis, with --pairs FILE",

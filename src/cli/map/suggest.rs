@@ -1,10 +1,10 @@
 //! `handwave map suggest`: source poses that would teach a map most.
 
-use super::shelf::{Shelf, SourceArgs};
+use super::shelf::{Shelf, SourceArgs, TargetArgs};
 use crate::cli::{ExitStatus, Failure, say};
 use crate::motion::mapping::{CANDIDATES, NOISE_VARIANCE, Uncertainty, candidates, scaled};
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[derive(Args, Debug)]
 pub(super) struct SuggestArgs {
@@ -13,15 +13,8 @@ pub(super) struct SuggestArgs {
     /// A target pose to find a source pose for, CLIP@PHASE (repeatable)
     #[arg(long, value_name = "CLIP@PHASE", required = true)]
     target: Vec<String>,
-    /// A pair already accepted, T=CLIP@PHASE (repeatable)
-    #[arg(long, value_name = "T=CLIP@PHASE")]
-    pair: Vec<String>,
-    /// Pairs already accepted, one a line
-    #[arg(long, value_name = "FILE")]
-    pairs: Option<PathBuf>,
-    /// A clip that targets may name without its path (repeatable)
-    #[arg(long, value_name = "CLIP")]
-    clip: Vec<PathBuf>,
+    #[command(flatten)]
+    targets: TargetArgs,
     /// Take the best candidate of each target before going on to the next
     #[arg(long)]
     auto: bool,
@@ -33,10 +26,7 @@ pub(super) struct SuggestArgs {
 pub(super) fn suggest(args: &SuggestArgs) -> Result<ExitStatus, Failure> {
     let source = args.source.read()?;
     let mut shelf = Shelf::of(None);
-    for clip in &args.clip {
-        shelf.add(clip)?;
-    }
-    let accepted = shelf.wishes(&args.pair, args.pairs.as_deref())?;
+    let accepted = args.targets.read(&mut shelf)?;
     let mut targets = Vec::new();
     for target in &args.target {
         targets.push(shelf.target(target, Path::new(""))?);

@@ -151,21 +151,13 @@ struct SourceTable {
     mean: Vec<f64>,
     spread_m: f64,
     #[serde(default)]
-    global: GlobalTable,
+    global: GlobalOptions,
     #[serde(default)]
     recording: String,
 }
 
 fn three() -> usize {
     3
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct GlobalTable {
-    anchor: Option<String>,
-    yaw: Option<bool>,
-    height: Option<bool>,
 }
 
 #[derive(Deserialize)]
@@ -354,11 +346,7 @@ impl MapFile {
                 dim,
                 channels: Vec::new(),
             },
-            global: GlobalOptions {
-                anchor: source.global.anchor,
-                yaw: source.global.yaw,
-                height: source.global.height,
-            },
+            global: source.global,
             spread_m: source.spread_m,
             recording: source.recording,
             velocity_weight_s: options.velocity_weight_s,
@@ -370,102 +358,6 @@ impl MapFile {
             volume,
             pairs,
         })
-    }
-
-    /// The file's text, the same bytes for the same map. Lengths to 0.1 mm, angles to a micro-radian.
-    pub fn to_toml(&self) -> String {
-        let mut lines: Vec<String> = Vec::new();
-        let quoted = |name: &str| toml::Value::from(name).to_string();
-        let names = |names: &[String]| {
-            let all: Vec<String> = names.iter().map(|n| quoted(n)).collect();
-            format!("[{}]", all.join(", "))
-        };
-        let row = |t: Option<f64>, places: &[[f64; 3]]| {
-            let cells = places.iter().flat_map(|p| &p[..self.header.dim]);
-            let cells = cells.map(|v| decimal(*v, 4));
-            let all: Vec<String> = t.map(|t| decimal(t, 4)).into_iter().chain(cells).collect();
-            format!("[{}]", all.join(", "))
-        };
-        let list = |numbers: &[f64]| {
-            let all: Vec<String> = numbers.iter().map(|v| decimal(*v, 9)).collect();
-            format!("[{}]", all.join(", "))
-        };
-        lines.push(
-            "# A pose map, written by `handwave map learn`. Metres, radians, seconds.".into(),
-        );
-        lines.push("handwave = \"map\"".into());
-        lines.push(format!("version = {VERSION}"));
-        lines.push("\n[source]".into());
-        lines.push(format!("points = {}", names(&self.header.points)));
-        lines.push(format!("dim = {}", self.header.dim));
-        lines.push(format!("reference = {}", row(None, &self.reference)));
-        lines.push(format!("mean = {}", row(None, &self.mean)));
-        lines.push(format!("spread_m = {}", decimal(self.spread_m, 6)));
-        let mut global = Vec::new();
-        if let Some(anchor) = &self.global.anchor {
-            global.push(format!("anchor = {}", quoted(anchor)));
-        }
-        for (key, value) in [("yaw", self.global.yaw), ("height", self.global.height)] {
-            if let Some(value) = value {
-                global.push(format!("{key} = {value}"));
-            }
-        }
-        if !global.is_empty() {
-            lines.push(format!("global = {{ {} }}", global.join(", ")));
-        }
-        lines.push(format!("recording = {}", quoted(&self.recording)));
-        lines.push("\n[options]".into());
-        for (key, value) in [
-            ("velocity_weight_s", self.velocity_weight_s),
-            ("smoothing_s", self.smoothing_s),
-            ("noise_variance", self.noise_variance),
-        ] {
-            lines.push(format!("{key} = {}", decimal(value, 6)));
-        }
-        lines.push(format!("components = {}", self.components));
-        lines.push(format!("yaw_ratio = {}", decimal(self.yaw_ratio, 6)));
-        lines.push("\n[target]".into());
-        lines.push(format!("joints = {}", names(&self.joints)));
-        match &self.volume {
-            VolumeSource::Clips(clips) => lines.push(format!("clips = {}", names(clips))),
-            VolumeSource::Volume(volume, root) => {
-                lines.push("\n[volume]".into());
-                lines.push(format!("mean = {}", list(&volume.mean)));
-                lines.push("axes = [".into());
-                for axis in volume.axes.chunks_exact(self.joints.len()) {
-                    lines.push(format!("  {},", list(axis)));
-                }
-                lines.push("]".into());
-                lines.push(format!("low = {}", list(&volume.low)));
-                lines.push(format!("high = {}", list(&volume.high)));
-                lines.push(format!("kept = {}", decimal(volume.kept, 6)));
-                let rows: Vec<String> = root
-                    .chunks_exact(volume.dimensions().max(1))
-                    .map(list)
-                    .collect();
-                if !rows.is_empty() {
-                    lines.push(format!("root = [{}]", rows.join(", ")));
-                }
-            }
-        }
-        for pair in &self.pairs {
-            lines.push("\n[[pair]]".into());
-            lines.push(format!("name = {}", quoted(&pair.name)));
-            let joints: Vec<String> = self
-                .joints
-                .iter()
-                .zip(&pair.pose)
-                .map(|(name, q)| format!("{} = {}", quoted(name), decimal(*q, 6)))
-                .collect();
-            lines.push(format!("pose = {{ {} }}", joints.join(", ")));
-            lines.push("frames = [".into());
-            for (t, frame) in pair.times_s.iter().zip(&pair.frames) {
-                lines.push(format!("  {},", row(Some(*t), frame)));
-            }
-            lines.push("]".into());
-        }
-        lines.push(String::new());
-        lines.join("\n")
     }
 }
 
@@ -572,13 +464,4 @@ fn filed_pair(
             .map(|row| places(&row[1..], dim))
             .collect(),
     })
-}
-
-/// `value` with at most `decimals` decimals and at least one, as TOML wants its floats.
-fn decimal(value: f64, decimals: usize) -> String {
-    let mut text = format!("{value:.decimals$}");
-    while text.ends_with('0') && !text.ends_with(".0") {
-        text.pop();
-    }
-    if text == "-0.0" { "0.0".into() } else { text }
 }

@@ -15,6 +15,7 @@ mod regression;
 mod root;
 pub mod study;
 mod volume;
+mod write;
 
 pub use body::{learn_volume, target_frames};
 pub use error::MappingError;

@@ -8,7 +8,7 @@ use super::error::MappingError;
 use super::map::{Pair, scaled};
 use super::regression::Regression;
 use super::volume::LatentVolume;
-use crate::base::SplitMix;
+use crate::base::random::SplitMix;
 
 /// A map with a part of it left out or put in.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,7 +147,7 @@ pub fn study(
     for variant in &plan.variants {
         let volume = LatentVolume::learn(frames, variant.axes.unwrap_or(1))?;
         for count in &plan.counts {
-            let mut chance = SplitMix(plan.seed ^ (*count as u64) << 32);
+            let mut chance = SplitMix::new(plan.seed ^ (*count as u64) << 32);
             let mut draws_db = Vec::new();
             for _ in 0..plan.splits {
                 let order = shuffled(pairs.len(), &mut chance);
@@ -223,7 +223,7 @@ pub fn snr_db(answers: &[Vec<f64>], truths: &[&[f64]]) -> f64 {
 fn shuffled(count: usize, chance: &mut SplitMix) -> Vec<usize> {
     let mut order: Vec<usize> = (0..count).collect();
     for at in (1..count).rev() {
-        order.swap(at, (chance.next() % (at as u64 + 1)) as usize);
+        order.swap(at, (chance.bits() % (at as u64 + 1)) as usize);
     }
     order
 }
