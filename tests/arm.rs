@@ -6,6 +6,7 @@ use handwave::config::Character;
 use handwave::pose::PoseSample;
 use handwave::puppet::Stage;
 use support::character::{Player, RATE_HZ, performance, shipped};
+use support::data::shared_data;
 use support::folder::Folder;
 use support::limits::LimitWatch;
 use support::program::{handwave, refused, run_virtual};
@@ -66,9 +67,9 @@ fn a_broken_map_or_class_is_refused_with_file_and_key() {
     );
     check(
         map,
-        "\"right_hand\"",
-        "\"right_foot\"",
-        &["no point right_foot", "map learn"],
+        "\"right\"",
+        "\"foot\"",
+        &["no point foot", "map learn"],
     );
     check(
         map,
@@ -131,7 +132,7 @@ fn the_arm_follows_the_dancer() {
     println!("{}", watch.extremes());
 
     let (header, samples) = performance(&character);
-    assert_eq!(header.points, ["head", "left_hand", "right_hand"]);
+    assert_eq!(header.points, ["head", "left", "right"]);
     // The performance begins when the arm has risen.
     let begins_s = character.safety.ramp_s;
     let rows = || (targets.rows.iter().enumerate()).filter(|(k, _)| (600..4300).contains(k));
@@ -169,6 +170,71 @@ fn the_arm_follows_the_dancer() {
         );
         assert!(lag_s < 0.2, "{what}: {lag_s} s behind");
     }
+}
+
+#[test]
+fn a_map_may_name_clips_in_place_of_its_volume() {
+    let folder = Folder::of_configs();
+    let play = || {
+        let file = folder.text("t.csv");
+        run_virtual(&[&folder.text("arm.toml"), "--targets", &file]).expect(0);
+        Targets::read(std::path::Path::new(&file))
+    };
+    let whole = play();
+    let map = folder.read("maps/arm.toml");
+    let (from, to) = (
+        map.find("[volume]").expect("a volume"),
+        map.find("[[pair]]").expect("pairs"),
+    );
+    let clips = ["keys", "sweep", "reach", "raise", "grip", "stir"];
+    let clips: Vec<String> = clips
+        .iter()
+        .map(|c| format!("\"../clips/arm_{c}.json\""))
+        .collect();
+    let linked = format!(
+        "{}clips = [{}]\n\n{}",
+        map[..from].trim_end().to_owned() + "\n",
+        clips.join(", "),
+        &map[to..]
+    );
+    folder.write("maps/arm.toml", &linked);
+    let linked = play();
+    let apart = (whole.rows.iter().zip(&linked.rows))
+        .flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()))
+        .fold(0.0, f64::max);
+    assert!(apart < 1e-4, "{apart} rad apart");
+    folder.edit("maps/arm.toml", "arm_stir", "arm_stur");
+    refused(
+        run_virtual(&[&folder.text("arm.toml")]),
+        2,
+        &["class.map", "arm_stur.json"],
+    );
+}
+
+#[test]
+fn the_dance_is_what_the_importer_makes() {
+    let Some(recording) = shared_data("hand/vr_controller/tracked-recording.json") else {
+        return;
+    };
+    let folder = Folder::of_configs();
+    let recording = recording.to_str().expect("a plain path");
+    let out = folder.text("again.csv");
+    handwave(&[
+        "poses",
+        "import",
+        recording,
+        "--points",
+        "head,left,right",
+        "--from",
+        "4",
+        "--to",
+        "24",
+        "--out",
+        &out,
+    ])
+    .expect(0);
+    let same = folder.read("again.csv") == folder.read("performances/vr_dance.csv");
+    assert!(same, "configs/performances/vr_dance.csv is out of date");
 }
 
 #[test]

@@ -344,7 +344,7 @@ fn travel_follows_the_change_of_pose() {
         .iter()
         .map(|v| [dot(&truth[0], v), dot(&truth[1], v)])
         .collect();
-    let map = RootMap::learn(&speeds, &velocities).expect("good rows");
+    let map = RootMap::learn(&speeds, &velocities, ROOT_RIDGE).expect("good rows");
     for (found, truth) in map.weights.iter().zip(truth.iter().flatten()) {
         assert!(
             (found - truth).abs() < 10.0 * ROOT_RIDGE.powi(2),
@@ -356,7 +356,7 @@ fn travel_follows_the_change_of_pose() {
         (forward - 0.3).abs() < 1e-5 && left.abs() < 1e-5,
         "{forward} {left}"
     );
-    let still = RootMap::learn(&speeds, &vec![[0.0; 2]; 300]).expect("good rows");
+    let still = RootMap::learn(&speeds, &vec![[0.0; 2]; 300], ROOT_RIDGE).expect("good rows");
     assert_eq!(still.velocity(&[1.0, 1.0, 1.0]), [0.0; 2]);
 }
 

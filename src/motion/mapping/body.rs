@@ -68,8 +68,22 @@ pub fn learn_volume(
             ]);
         }
     }
-    let root = RootMap::learn(&speeds, &velocities)?;
-    Ok((volume, root))
+    let root = RootMap::learn(&speeds, &velocities, strongest(&speeds))?;
+    Ok((volume, root.scaled_to(&speeds, &velocities)))
+}
+
+/// Root of the summed squared speed of the axis that moves most: the ridge of the root map.
+///
+/// With the small ridge of the thesis eq. 8.1 explains a steady walk best by its overtones: weak axes,
+/// which hardly rest, with large weights. A map learned from few pairs does not move them, and the body
+/// would stand. A ridge as large as the strongest axis spreads the weights over axes as they move; what
+/// it takes from the speed [`RootMap::scaled_to`] gives back.
+fn strongest(speeds: &[Vec<f64>]) -> f64 {
+    let axes = speeds.first().map_or(0, Vec::len);
+    (0..axes)
+        .map(|axis| speeds.iter().map(|s| s[axis] * s[axis]).sum::<f64>())
+        .fold(0.0, f64::max)
+        .sqrt()
 }
 
 impl MapFile {

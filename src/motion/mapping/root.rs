@@ -18,11 +18,16 @@ pub struct RootMap {
 
 impl RootMap {
     /// Learns W from the speed of every coefficient (one row a frame, per second) and the root's
-    /// velocity (forwards, left; m/s) at the same frames. All velocities zero: a body that stays.
+    /// velocity (forwards, left; m/s) at the same frames, with `ridge` for sigma_trans
+    /// ([`ROOT_RIDGE`] at least). All velocities zero: a body that stays.
     ///
     /// # Errors
     /// Rows of different length, numbers that are not finite.
-    pub fn learn(speeds: &[Vec<f64>], velocities: &[[f64; 2]]) -> Result<Self, MappingError> {
+    pub fn learn(
+        speeds: &[Vec<f64>],
+        velocities: &[[f64; 2]],
+        ridge: f64,
+    ) -> Result<Self, MappingError> {
         if velocities.iter().flatten().all(|v| *v == 0.0) {
             return Ok(Self::default());
         }
@@ -34,7 +39,8 @@ impl RootMap {
         let count = speeds.len().min(velocities.len());
         let a = DMatrix::from_fn(count, axes, |r, c| speeds[r][c].abs());
         let b = DMatrix::from_fn(count, 2, |r, c| velocities[r][c]);
-        let gram = a.transpose() * &a + DMatrix::identity(axes, axes) * ROOT_RIDGE.powi(2);
+        let gram =
+            a.transpose() * &a + DMatrix::identity(axes, axes) * ridge.max(ROOT_RIDGE).powi(2);
         // Positive definite by the ridge; numbers too large to multiply leave the body where it is.
         let Some(factor) = Cholesky::new(gram) else {
             return Ok(Self::default());
@@ -44,6 +50,26 @@ impl RootMap {
         Ok(Self {
             weights: w.as_slice().to_vec(),
         })
+    }
+
+    /// The map with each row scaled so that it travels as fast as `velocities` on the whole.
+    pub fn scaled_to(mut self, speeds: &[Vec<f64>], velocities: &[[f64; 2]]) -> Self {
+        let mut sums = [[0.0; 2]; 2];
+        for (speed, velocity) in speeds.iter().zip(velocities) {
+            let found = self.velocity(speed);
+            for row in 0..2 {
+                sums[row][0] += found[row] * velocity[row];
+                sums[row][1] += found[row] * found[row];
+            }
+        }
+        let axes = self.weights.len() / 2;
+        for (row, weights) in self.weights.chunks_exact_mut(axes.max(1)).enumerate() {
+            let [with, own] = sums[row];
+            if own > 0.0 {
+                weights.iter_mut().for_each(|w| *w *= with / own);
+            }
+        }
+        self
     }
 
     /// Root velocity (forwards, left; m/s) while the coefficients change by `change` per second.

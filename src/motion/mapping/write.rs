@@ -108,3 +108,72 @@ fn decimal(value: f64, decimals: usize) -> String {
     }
     if text == "-0.0" { "0.0".into() } else { text }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::file::MapFileError;
+    use super::*;
+
+    const ARM: &str = include_str!("../../../configs/maps/arm.toml");
+
+    #[test]
+    fn what_is_written_reads_back_the_same() {
+        let map = MapFile::from_toml(ARM).expect("the shipped map");
+        assert_eq!(map.to_toml(), ARM);
+        let again = MapFile::from_toml(&map.to_toml()).expect("its own text");
+        assert_eq!(again, map);
+        let mut linked = map.clone();
+        linked.volume = VolumeSource::Clips(vec!["../clips/a.json".into()]);
+        let again = MapFile::from_toml(&linked.to_toml()).expect("its own text");
+        assert_eq!(again, linked);
+    }
+
+    #[test]
+    fn the_example_of_the_documentation_is_a_map() {
+        let example: String = include_str!("file.rs")
+            .lines()
+            .skip_while(|line| *line != "//! ```toml")
+            .skip(1)
+            .take_while(|line| *line != "//! ```")
+            .map(|line| line.trim_start_matches("//!").to_owned() + "\n")
+            .collect();
+        // It shows both ways to say what poses are admissible; a map has one.
+        let error = MapFile::from_toml(&example).expect_err("both ways");
+        assert!(error.to_string().contains("found both"), "{error}");
+        let one = example.replacen("clips = ", "# clips = ", 1);
+        let map = MapFile::from_toml(&one).expect("the example");
+        assert_eq!(map.pairs.len(), 1);
+        assert_eq!(map.velocity_weight_s, 0.1);
+    }
+
+    #[test]
+    fn values_that_are_not_allowed_are_named() {
+        for (from, to, key) in [
+            ("handwave = \"map\"", "handwave = \"gestures\"", "handwave"),
+            ("dim = 3", "dim = 4", "source.dim"),
+            ("reference = [", "reference = [1.0, ", "source.reference"),
+            ("spread_m = 0.", "spread_m = -0.", "source.spread_m"),
+            (
+                "noise_variance = 0.05",
+                "noise_variance = 0.0",
+                "options.noise_variance",
+            ),
+            ("components = 50", "components = 0", "options.components"),
+            ("low = [-", "low = [", "volume.low"),
+            ("axes = [\n  [", "axes = [\n  [0.5, ", "volume.axes row 1"),
+            ("frames = [\n  [0.0", "frames = [\n  [5.0", "frames row 2"),
+            ("\"joint1\" = ", "\"joint9\" = ", "pair 1"),
+        ] {
+            assert!(ARM.contains(from), "{from:?}");
+            match MapFile::from_toml(&ARM.replacen(from, to, 1)) {
+                Err(MapFileError::Value { key: found, .. }) => {
+                    assert!(
+                        found.contains(key),
+                        "{to:?}: blamed {found:?}, expected {key:?}"
+                    );
+                }
+                other => panic!("{to:?} gave {other:?}"),
+            }
+        }
+    }
+}
