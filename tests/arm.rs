@@ -274,11 +274,11 @@ fn lost_poses_bring_the_arm_to_rest_and_it_eases_in_when_they_return() {
     play(&mut player, begins_s + 8.0, true);
     let before = player.positions().to_vec();
     let held = play(&mut player, begins_s + 8.3, false);
-    let eased = play(&mut player, begins_s + 9.5, false);
-    let resting = play(&mut player, begins_s + 10.0, false);
-    assert!(player.puppet.targets().poses_lost, "not lost after 2 s");
+    let eased = play(&mut player, begins_s + 11.0, false);
+    let resting = play(&mut player, begins_s + 11.5, false);
+    assert!(player.puppet.targets().poses_lost, "not lost after 3 s");
     assert!(resting < 0.02, "still moving at {resting} rad/s");
-    let resumed = play(&mut player, begins_s + 12.0, true);
+    let resumed = play(&mut player, begins_s + 13.5, true);
     assert!(resumed > 0.5, "poses are back, joints at {resumed} rad/s");
     let way = before
         .iter()

@@ -7,6 +7,7 @@ use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
 use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files};
+use crate::gesture::PerformerScale;
 use crate::live::control::Ending;
 use crate::live::session::{self, Observer, Report, Session};
 use crate::live::source::{self, SourceReader};
@@ -44,6 +45,7 @@ pub const EXAMPLES: &str = "Examples:
   handwave run                                        the built-in quadruped, simulated, with a recorded performer
   handwave run --bus dynamixel:/dev/ttyUSB0@1000000   the same on real servos
   handwave run my_robot.toml --input file:take3.jsonl
+  handwave run --scale 1.5                            a small hand (its poses enlarged to the gestures' size)
   handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
@@ -56,6 +58,10 @@ pub struct RunOptions {
     /// Pose source in place of the configuration's, such as file:take.jsonl
     #[arg(long, value_name = "SOURCE")]
     input: Option<String>,
+    /// Size of the gestures' reference by the performer's (1.4: a child), or rest: measured over
+    /// the first still second
+    #[arg(long, value_name = "NUMBER|rest")]
+    scale: Option<PerformerScale>,
     /// Bus in place of the configuration's: sim, dynamixel:PATH@BAUD
     #[arg(long, value_name = "BUS")]
     bus: Option<String>,
@@ -108,6 +114,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         character.bus = bus
             .parse()
             .map_err(|e| Failure::input(format!("--bus {bus}: {e}")))?;
+    }
+    if let Some(scale) = options.scale {
+        character.front_options.scale = scale;
     }
     let rate_hz = options.rate.unwrap_or(character.rate_hz);
     if !(10.0..=2000.0).contains(&rate_hz) {

@@ -5,14 +5,17 @@ use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, OnExit, OnLost, OnServoFault};
 use super::files::Files;
 use super::motion::{
-    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts, read,
+    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts,
+    neighbourhoods, read,
 };
 use super::servos::servo_map;
 use crate::base::suggest::hint;
 use crate::body::JointSpace;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
-use crate::gesture::{EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet};
+use crate::gesture::{
+    EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet, PerformerScale,
+};
 use crate::motion::Animator;
 use crate::motion::class::MotionClass;
 use crate::motion::clip::ClipKind;
@@ -180,6 +183,8 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         front_options: FrontEndOptions {
             estimator,
             lambda: file.input.window,
+            scale: performer_scale(&file, &at)?,
+            ..FrontEndOptions::default()
         },
         safety: Safety {
             ramp_s: safety.ramp_s,
@@ -302,10 +307,30 @@ impl Character {
         Envelope::new(self.limits.clone(), dt_s)
     }
 
+    /// Per node of the motion graph the gestures that compete there, for
+    /// [`FrontEnd::with_neighbourhoods`].
+    pub fn neighbourhoods(&self) -> Vec<Vec<usize>> {
+        neighbourhoods(&self.graph.1, &self.classes, self.gestures.gestures.len())
+    }
+
     /// Names of the layers, in order.
     pub fn layer_names(&self) -> Vec<String> {
         self.layers.iter().map(|l| l.name.clone()).collect()
     }
+}
+
+/// The scale of `[input] scale`: a number, or `"rest"`.
+fn performer_scale(file: &CharacterFile, at: &Pointer<'_>) -> Result<PerformerScale, ConfigError> {
+    let Some(value) = &file.input.scale else {
+        return Ok(PerformerScale::default());
+    };
+    let written = match value.get_ref() {
+        toml::Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    written
+        .parse()
+        .map_err(|problem: String| at.at(value.span(), "input.scale", problem))
 }
 
 fn joint_ranges(limits: &[JointEnvelope]) -> Vec<JointRange> {

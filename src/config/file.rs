@@ -51,6 +51,9 @@ pub struct Input {
     /// Window of the wave filters in periods.
     #[serde(default)]
     pub window: Option<f64>,
+    /// Size of the gestures' reference by the performer's: a number, or `"rest"`.
+    #[serde(default)]
+    pub scale: Option<Spanned<toml::Value>>,
 }
 
 /// A file of gestures.
@@ -242,7 +245,7 @@ pub struct SafetyEntry {
     /// Poses count as lost after this long, seconds.
     #[serde(default = "one")]
     pub lost_s: f64,
-    /// `idle` or `stop`.
+    /// `idle`, `hold` or `stop`.
     #[serde(default)]
     pub on_lost: OnLost,
     /// A servo latches a hardware error or comes back without torque: `stop` or `continue`.
@@ -260,6 +263,8 @@ pub enum OnLost {
     /// Come to rest and wait.
     #[default]
     Idle,
+    /// Hold the pose and wait.
+    Hold,
     /// Lie down, torque off, exit code 4.
     Stop,
 }

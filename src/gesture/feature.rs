@@ -7,7 +7,9 @@
 //! the time stamps.
 
 use super::LONGEST_GAP_S;
-use crate::pose::{GlobalFit, GlobalOptions, PoseHeader, PoseSample, Recording, SampleFault};
+use crate::pose::{
+    GlobalFit, GlobalOptions, PoseHeader, PoseSample, Recording, SampleFault, channel_as_point,
+};
 
 /// The kernel ends here, in standard deviations: 0.03 % of its weight is beyond.
 pub const KERNEL_SIGMAS: f64 = 3.5;
@@ -128,7 +130,9 @@ pub enum FeatureError {
 pub struct PoseFeatures {
     spec: FeatureSpec,
     fit: GlobalFit,
+    /// Index in the stream of each point; of a channel where the stream has no points.
     columns: Vec<usize>,
+    from_points: bool,
     places: Vec<[f64; 3]>,
     seen: Vec<bool>,
     fresh: Vec<[f64; 3]>,
@@ -145,7 +149,8 @@ pub struct PoseFeatures {
 }
 
 impl PoseFeatures {
-    /// Matches the points of `spec` to those of `stream` by name.
+    /// Matches the points of `spec` to those of `stream` by name, or to the channels of a stream that has
+    /// no points.
     ///
     /// # Errors
     /// Points the stream lacks, another dimension, an anchor that is no point.
@@ -156,7 +161,13 @@ impl PoseFeatures {
                 expected: spec.header.dim,
             });
         }
-        let find = |name: &String| stream.points.iter().position(|point| point == name);
+        // A stream of channels alone (a face) is read as points that move with its channels.
+        let places = if stream.points.is_empty() {
+            &stream.channels
+        } else {
+            &stream.points
+        };
+        let find = |name: &String| places.iter().position(|place| place == name);
         let names = &spec.header.points;
         let missing: Vec<String> = names
             .iter()
@@ -177,6 +188,7 @@ impl PoseFeatures {
         let width = points * spec.header.dim;
         Ok(Self {
             columns: names.iter().filter_map(find).collect(),
+            from_points: !stream.points.is_empty(),
             places: vec![[0.0; 3]; points],
             seen: vec![false; points],
             fresh: vec![[0.0; 3]; points],
@@ -219,8 +231,13 @@ impl PoseFeatures {
         let mut count = 0;
         for (index, column) in self.columns.iter().enumerate() {
             let confidence = sample.confidence.get(*column).copied().unwrap_or(1.0);
-            let place = sample.points.get(*column).copied().flatten();
-            let place = place.filter(|_| confidence >= LEAST_CONFIDENCE);
+            let place = if self.from_points {
+                let place = sample.points.get(*column).copied().flatten();
+                place.filter(|_| confidence >= LEAST_CONFIDENCE)
+            } else {
+                let value = sample.channels.get(*column).copied().flatten();
+                value.map(|value| channel_as_point(index, self.columns.len(), value))
+            };
             if let Some(place) = place {
                 if !place.iter().all(|value| value.abs() < 1e6) {
                     return Err(SampleFault::NonFinite);

@@ -13,6 +13,7 @@ mod period;
 mod plane;
 mod separability;
 mod set;
+mod tracker;
 mod wave;
 
 pub use channel::{DerivedChannel, DerivedChannelError, LONGEST_SMOOTHING_S};
@@ -26,6 +27,7 @@ pub use period::{PeriodEstimate, find_period};
 pub use plane::{Plane, References};
 pub use separability::{Response, responses};
 pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
+pub use tracker::{PerformerScale, TrackingCounts};
 pub use wave::{
     CorrelationEstimator, DirectEstimator, Estimator, EstimatorKind, FastEstimator, GaborEstimator,
     LONGEST_GAP_S, LeastSquaresEstimator, PlanePoint, Shape, WaveEstimate,

@@ -10,7 +10,7 @@ use crate::base::{Clock, Time, VirtualClock};
 use crate::bus::{BusError, ServoBus, TorqueReport};
 use crate::config::file::{OnExit, OnLost, OnServoFault};
 use crate::config::{Character, ConfigError};
-use crate::gesture::{FrontEnd, FrontEndError};
+use crate::gesture::{FrontEnd, FrontEndError, TrackingCounts};
 use crate::motion::graph::TransitionCounts;
 use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader, PoseSample};
 use crate::puppet::{ClassInput, LostPolicy, Puppet, PuppetOptions};
@@ -34,6 +34,10 @@ pub struct Report {
     pub dropped: FaultCounts,
     /// Samples that the front end refused.
     pub refused: u64,
+    /// What the front end mended of the tracker's.
+    pub tracking: TrackingCounts,
+    /// The performer's scale; `None` when it was to be measured and the pose was never still.
+    pub performer_scale: Option<f64>,
     /// Why the pose stream ended early, if it did.
     pub pose_error: Option<PoseError>,
     /// Cycles that were not recorded because the observer was slow.
@@ -68,6 +72,7 @@ pub fn puppet(
         &character.gestures,
         header,
         character.front_options,
+        &character.neighbourhoods(),
         &character.features(),
     )?;
     let front = character.with_channels(front)?;
@@ -94,6 +99,7 @@ pub fn puppet(
             lost_s: safety.lost_s,
             on_lost: match safety.on_lost {
                 OnLost::Idle => LostPolicy::Idle,
+                OnLost::Hold => LostPolicy::Hold,
                 OnLost::Stop => LostPolicy::Stop,
             },
         },
@@ -272,6 +278,8 @@ fn report(
         transitions: puppet.animator().counts(),
         dropped,
         refused: puppet.rejected_samples(),
+        tracking: puppet.front().tracking(),
+        performer_scale: puppet.front().performer_scale(),
         pose_error,
         records_lost,
         real_time,

@@ -91,6 +91,11 @@ impl SourceArgs {
         let name = self.poses.display().to_string();
         let failed = |e: &dyn std::fmt::Display| Failure::input(format!("{name}: {e}"));
         let (recording, _) = poses::read(&self.poses)?;
+        if recording.header.points.is_empty() {
+            return Err(failed(
+                &"the stream has channels only; make points of them first, with `handwave poses import FILE --as-points A,B,...`",
+            ));
+        }
         let recording = recording
             .without_gaps()
             .map_err(|point| failed(&format!("point {point} is never seen")))?;

@@ -43,8 +43,8 @@ pub struct DirectClass {
     waypoint: Vec<f64>,
     position: Vec<f64>,
     velocity: Vec<f64>,
-    /// Rate at which the joints closed in on the waypoint in the last step, 1/s.
-    rate: f64,
+    /// Rate at which, with the waypoint at rest, speeds would stay as they are, 1/s.
+    steady: f64,
     /// Part of the mapped pose that shows, before easing.
     entered: f64,
     share: f64,
@@ -67,7 +67,7 @@ impl DirectClass {
             goal: rest.clone(),
             waypoint: rest.clone(),
             position: rest.clone(),
-            rate: 0.0,
+            steady: FOLLOW_RATE,
             velocity: vec![0.0; joints],
             rest,
             map,
@@ -117,6 +117,17 @@ impl DirectClass {
     /// Joints ease towards the mapped pose within a share of their speed and acceleration, so nothing
     /// jumps when poses begin, come back after a loss, or leap; and they never leave the volume.
     pub fn step(&mut self, dt_s: f64, out: &mut [f64]) -> Played {
+        if !(dt_s > 0.0) {
+            // The puppet's time stands still while a pose is held.
+            out.copy_from_slice(&self.position);
+            return Played {
+                amplitude: ease(self.entered) * self.share,
+                stride: 1.0,
+                locked: true,
+                uncertainty: self.uncertainty.1,
+                ..Played::default()
+            };
+        }
         let rise = dt_s / ENTER_S;
         self.entered = if self.share > 0.0 {
             (self.entered + rise).min(1.0)
@@ -177,12 +188,10 @@ impl DirectClass {
             most = most.min((acceleration / gap).sqrt()).min(velocity / gap);
             change = change.min(acceleration * dt_s / self.velocity[joint].abs());
         }
-        // The rate at which, with the waypoint at rest, speeds would stay as they are.
-        let steady = self.rate / (1.0 - self.rate * dt_s);
         if self.velocity.iter().any(|v| *v != 0.0) {
-            most = most.min((1.0 + change) * steady);
+            most = most.min((1.0 + change) * self.steady);
         }
-        let least = (1.0 - change).max(0.0) * steady;
+        let least = (1.0 - change).max(0.0) * self.steady;
         let rate = wanted.max(slowest).max(least).min(most);
         let mut part = 1.0 - (-WAYPOINT_RATE * dt_s).exp();
         for (joint, range) in self.ranges.iter().enumerate() {
@@ -205,7 +214,7 @@ impl DirectClass {
             self.velocity[joint] = rate * (self.waypoint[joint] - self.position[joint]);
             self.position[joint] += self.velocity[joint] * dt_s;
         }
-        self.rate = rate;
+        self.steady = rate / (1.0 - rate * dt_s);
     }
 }
 
