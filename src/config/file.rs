@@ -1,5 +1,5 @@
 //! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`,
-//! that of a pose map in `configs/arm.toml`.
+//! `[[channel]]` in `configs/face.toml`, `map` in `configs/arm.toml`.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
