@@ -141,7 +141,8 @@ const STILL_RAD_S: f64 = 0.02;
 const SETTLE_AT_MOST_S: f64 = 4.0;
 
 impl Puppet {
-    /// Puts the parts together. `class_inputs`: per animator class what drives it; `end_pose`: where a run ends, rad, model order.
+    /// Puts the parts together. `class_inputs`: per animator class what drives it; `end_pose`: where a
+    /// run ends, rad, model order.
     pub fn new(
         front: FrontEnd,
         animator: Animator,
