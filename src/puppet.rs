@@ -8,6 +8,7 @@ mod gaps;
 use crate::base::{JointState, Time};
 use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
 use crate::motion::class::Drive;
+use crate::motion::mapping::Seen;
 use crate::motion::{Animator, ease};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
@@ -88,13 +89,21 @@ pub struct Targets {
     pub poses_lost: bool,
 }
 
+/// What drives a class.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub struct ClassInput {
+    /// Index of its gesture in the front end; `None` for a pose map that needs none.
+    pub gesture: Option<usize>,
+    /// Index of its feature in the front end, for a pose map.
+    pub feature: Option<usize>,
+}
+
 /// A character that is being played: gesture front end, animator, envelope and the stages of a run.
 pub struct Puppet {
     front: FrontEnd,
     animator: Animator,
     envelope: Envelope,
-    /// Per class the gesture that drives it.
-    gesture_of_class: Vec<usize>,
+    class_inputs: Vec<ClassInput>,
     end_pose: Vec<f64>,
     options: PuppetOptions,
     stage: Stage,
@@ -132,13 +141,13 @@ const STILL_RAD_S: f64 = 0.02;
 const SETTLE_AT_MOST_S: f64 = 4.0;
 
 impl Puppet {
-    /// Puts the parts together. `gesture_of_class`: per animator class the index of its gesture in
-    /// the front end; `end_pose`: where a run ends, rad, model order.
+    /// Puts the parts together. `class_inputs`: per animator class what drives it; `end_pose`: where a
+    /// run ends, rad, model order.
     pub fn new(
         front: FrontEnd,
         animator: Animator,
         envelope: Envelope,
-        gesture_of_class: Vec<usize>,
+        class_inputs: Vec<ClassInput>,
         end_pose: Vec<f64>,
         options: PuppetOptions,
     ) -> Self {
@@ -146,14 +155,14 @@ impl Puppet {
         let estimates = front.estimates().to_vec();
         let channels = vec![f64::NAN; front.channel_names().len()];
         Self {
-            joins: vec![Join::default(); gesture_of_class.len()],
-            drives: vec![Drive::default(); gesture_of_class.len()],
+            joins: vec![Join::default(); class_inputs.len()],
+            drives: vec![Drive::default(); class_inputs.len()],
             estimates,
             channels,
             front,
             animator,
             envelope,
-            gesture_of_class,
+            class_inputs,
             end_pose,
             options,
             stage: Stage::Waiting,
@@ -257,13 +266,22 @@ impl Puppet {
         for (gesture, estimate) in self.estimates.iter_mut().enumerate() {
             *estimate = self.front.predict(gesture, actuation - self.tempo.held_s);
         }
-        let played = self.animator.played();
-        for (class, (drive, gesture)) in (self.drives.iter_mut())
-            .zip(&self.gesture_of_class)
-            .enumerate()
-        {
-            let estimate = &self.estimates[*gesture];
-            let moving = played[class].amplitude > MOVING;
+        for (class, input) in self.class_inputs.iter().enumerate() {
+            if let Some(features) = input.feature.and_then(|index| self.front.feature(index)) {
+                let seen = Seen {
+                    feature: features.feature(),
+                    yaw_rad: features.yaw_rad(),
+                    share,
+                };
+                self.animator.see(class, seen);
+            }
+            let drive = &mut self.drives[class];
+            let Some(gesture) = input.gesture else {
+                drive.amplitude = share;
+                continue;
+            };
+            let estimate = &self.estimates[gesture];
+            let moving = self.animator.played()[class].amplitude > MOVING;
             let (frequency_hz, phase_rad) = match estimate.kind {
                 GestureKind::Cyclic => self.joins[class].step(estimate, age > GAP_S, moving, dt_s),
                 GestureKind::NonCyclic => (0.0, estimate.phase_rad),
@@ -363,9 +381,9 @@ impl Puppet {
         &self.animator
     }
 
-    /// Gesture that drives each class.
-    pub fn gesture_of_class(&self) -> &[usize] {
-        &self.gesture_of_class
+    /// What drives each class.
+    pub fn class_inputs(&self) -> &[ClassInput] {
+        &self.class_inputs
     }
 
     /// Samples that the front end could not use.

@@ -4,6 +4,7 @@ pub mod bus;
 pub mod clip;
 mod failure;
 pub mod gesture;
+pub mod map;
 pub mod poses;
 pub mod run;
 pub mod sim;
@@ -38,6 +39,8 @@ enum Command {
     Poses(poses::PosesArgs),
     /// Bring motion in; author gaits for a legged robot
     Clip(clip::ClipArgs),
+    /// Pose mapping: the performer's pose itself drives a body; suggest, learn, apply, study
+    Map(map::MapArgs),
     /// Look at and set up servos on a bus
     Bus(bus::BusArgs),
     /// Simulated servos on a pseudo-terminal, for any client
@@ -53,6 +56,7 @@ pub fn main() -> ExitCode {
         Some(Command::Gesture(args)) => gesture::run(args),
         Some(Command::Poses(args)) => poses::run(args),
         Some(Command::Clip(args)) => clip::run(&args),
+        Some(Command::Map(args)) => map::run(args),
         Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),
     };

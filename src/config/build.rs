@@ -13,14 +13,19 @@ use crate::base::suggest::hint;
 use crate::body::JointSpace;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
-use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet, PerformerScale};
+use crate::gesture::{
+    EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet, PerformerScale,
+};
 use crate::motion::Animator;
 use crate::motion::class::MotionClass;
 use crate::motion::clip::ClipKind;
 use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
 use crate::motion::layer::Layer;
+use crate::motion::mapping::DirectClass;
+use crate::motion::node::Node;
 use crate::motion::range::JointRange;
+use crate::pose::PoseHeader;
 use crate::robot::{Envelope, JointEnvelope, RobotModel};
 
 /// A checked character: everything but the pose stream and the bus.
@@ -105,9 +110,18 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let limits = envelope_limits(&file, &model);
     let servos = servo_map(&file, &model, &at)?;
     let ranges = joint_ranges(&limits);
-    let gestures = gesture_set(&files, &file, &at)?;
-    let classes = class_parts(&files, &file, &joints, &gestures, &at)?;
-    for class in &classes {
+    let mut gestures = gesture_set(&files, &file, &at)?;
+    let classes = class_parts(&files, &file, &joints, &limits, &gestures, &at)?;
+    if let (true, Some(map)) = (
+        gestures.gestures.is_empty(),
+        classes.iter().find_map(|c| c.map.as_ref()),
+    ) {
+        // Global motion is then what the map says it is.
+        gestures.header = map.spec.header.clone();
+        gestures.global = map.spec.global.clone();
+        gestures.reference = map.spec.reference.clone();
+    }
+    for class in classes.iter().filter(|c| c.map.is_none()) {
         for example in &class.examples {
             if let Some(problem) = outside_limits(&example.clip, &model).first() {
                 return Err(at.key(
@@ -223,9 +237,14 @@ impl Character {
         let classes = self
             .classes
             .iter()
-            .map(|c| {
-                MotionClass::new(&c.name, c.examples.clone(), ranges.clone())
-                    .map_err(|e| wrong("class", None, e.to_string()))
+            .map(|c| match &c.map {
+                Some(parts) => {
+                    let (map, always) = (parts.map.clone(), c.gesture.is_none());
+                    Ok(DirectClass::new(&c.name, map, ranges.clone(), always).into())
+                }
+                None => MotionClass::new(&c.name, c.examples.clone(), ranges.clone())
+                    .map(Node::from)
+                    .map_err(|e| wrong("class", None, e.to_string())),
             })
             .collect::<Result<Vec<_>, _>>()?;
         let mut layers = Vec::new();
@@ -262,6 +281,12 @@ impl Character {
             graph,
             layers,
         ))
+    }
+
+    /// Features of the pose maps, one per class that has one, in node order.
+    pub fn features(&self) -> Vec<FeatureSpec> {
+        let maps = self.classes.iter().filter_map(|c| c.map.as_ref());
+        maps.map(|map| map.spec.clone()).collect()
     }
 
     /// Whether the servos' watchdog leaves room for cycles at `rate_hz`: one that runs out between two
@@ -390,11 +415,19 @@ fn gesture_set(
 ) -> Result<GestureSet, ConfigError> {
     let entry = match file.gesture.as_slice() {
         [entry] => entry,
+        [] if file.class.iter().any(|c| c.map.is_some()) => {
+            let header = PoseHeader {
+                points: Vec::new(),
+                dim: 3,
+                channels: Vec::new(),
+            };
+            return Ok(GestureSet::new(&header, Vec::new()));
+        }
         other => {
             return Err(at.key(
                 "gesture",
                 format!(
-                    "{} gesture files are named; give one [[gesture]] file, which may define many gestures",
+                    "{} gesture files are named; give one [[gesture]] file, which may define many gestures (only a character with a class with `map` may be without)",
                     other.len()
                 ),
             ));

@@ -1,4 +1,5 @@
-//! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`, `[[channel]]` in `configs/face.toml`.
+//! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`,
+//! `[[channel]]` in `configs/face.toml`, `map` in `configs/arm.toml`.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -12,7 +13,8 @@ pub struct CharacterFile {
     pub name: String,
     /// Where poses come from.
     pub input: Input,
-    /// Gesture files.
+    /// Gesture files; none where a pose map alone drives the character.
+    #[serde(default)]
     pub gesture: Vec<GestureEntry>,
     /// Motion classes, the nodes of the graph.
     pub class: Vec<ClassEntry>,
@@ -68,10 +70,13 @@ pub struct GestureEntry {
 pub struct ClassEntry {
     /// Class name.
     pub name: Spanned<String>,
-    /// The gesture that drives it.
-    pub gesture: Spanned<String>,
+    /// The gesture that drives it; with a map: that activates it.
+    pub gesture: Option<Spanned<String>>,
     /// Its example clips.
+    #[serde(default)]
     pub clip: Vec<ClipEntry>,
+    /// Instead of clips, path of a pose map: the pose itself drives the body.
+    pub map: Option<Spanned<String>>,
 }
 
 /// An example clip of a class.

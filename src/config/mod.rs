@@ -1,13 +1,14 @@
 //! Typed configuration: one TOML file names a whole character; checked at load, built into parts.
 //!
 //! [`mod@file`] is what a user writes, [`files`] where its parts are read from (a folder, or those
-//! embedded in the program), [`build`] checks it and makes the parts, [`error`] tells what is wrong.
+//! embedded in the program), [`build`] checks it and makes the parts, [`map`] learns the pose maps it names, [`error`] tells what is wrong.
 
 pub mod build;
 mod channel;
 pub mod error;
 pub mod file;
 pub mod files;
+pub mod map;
 mod motion;
 mod servos;
 

@@ -1,14 +1,16 @@
 //! Classes, graph and layers of a configuration, checked and resolved to indices.
 
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, LayerEntry};
+use super::file::{CharacterFile, ClassEntry, LayerEntry};
 use super::files::Files;
+use super::map::{MapParts, load_map};
 use crate::base::suggest::hint;
 use crate::gesture::{GestureKind, GestureSet};
 use crate::motion::class::Example;
 use crate::motion::clip::{Clip, ClipFile, ClipKind};
 use crate::motion::graph::GraphOptions;
 use crate::motion::layer::ChannelMap;
+use crate::robot::JointEnvelope;
 use std::ops::Range;
 
 /// A class before it is built.
@@ -16,8 +18,10 @@ use std::ops::Range;
 pub struct ClassParts {
     /// Class name.
     pub name: String,
-    /// Index of its gesture in the gesture set.
-    pub gesture: usize,
+    /// Index of its gesture in the gesture set; `None` for a pose map that needs none.
+    pub gesture: Option<usize>,
+    /// The pose map, in place of clips.
+    pub map: Option<MapParts>,
     pub(super) examples: Vec<Example>,
 }
 
@@ -75,6 +79,7 @@ pub(super) fn class_parts(
     files: &Files,
     file: &CharacterFile,
     joints: &[String],
+    limits: &[JointEnvelope],
     gestures: &GestureSet,
     at: &Pointer<'_>,
 ) -> Result<Vec<ClassParts>, ConfigError> {
@@ -91,17 +96,28 @@ pub(super) fn class_parts(
                 format!("{name:?} is used twice"),
             ));
         }
-        let wanted = class.gesture.get_ref();
-        let names = || gestures.gestures.iter().map(|g| g.name.as_str());
-        let gesture = names().position(|g| g == wanted).ok_or_else(|| {
-            let hint = hint(wanted, names());
-            let all: Vec<&str> = names().collect();
-            at.at(
-                class.gesture.span(),
+        let gesture = gesture_index(class, gestures, at)?;
+        if let Some(path) = &class.map {
+            parts.push(direct_parts(
+                files, file, class, path, joints, limits, gesture, at,
+            )?);
+            continue;
+        }
+        let (Some(gesture), Some(wanted)) = (gesture, &class.gesture) else {
+            return Err(at.at(
+                class.name.span(),
                 "class.gesture",
-                format!("no gesture {wanted:?}{hint} Gestures: {}", all.join(", ")),
-            )
-        })?;
+                "a class of clips needs a gesture that drives it; only a class with `map` may be without",
+            ));
+        };
+        let wanted = wanted.get_ref();
+        if class.clip.is_empty() {
+            return Err(at.at(
+                class.name.span(),
+                "class.clip",
+                "neither clips nor a map; give clip = [{ file = ... }] or map = \"maps/NAME.toml\"",
+            ));
+        }
         let mut examples = Vec::new();
         for entry in &class.clip {
             let in_range = (0.0..=10.0).contains(&entry.amplitude)
@@ -158,11 +174,73 @@ pub(super) fn class_parts(
         }
         parts.push(ClassParts {
             name: name.clone(),
-            gesture,
+            gesture: Some(gesture),
+            map: None,
             examples,
         });
     }
     Ok(parts)
+}
+
+/// Index of the gesture that a class names.
+fn gesture_index(
+    class: &ClassEntry,
+    gestures: &GestureSet,
+    at: &Pointer<'_>,
+) -> Result<Option<usize>, ConfigError> {
+    let Some(entry) = &class.gesture else {
+        return Ok(None);
+    };
+    let wanted = entry.get_ref();
+    let names = || gestures.gestures.iter().map(|g| g.name.as_str());
+    let found = names().position(|g| g == wanted).ok_or_else(|| {
+        let hint = hint(wanted, names());
+        let all: Vec<&str> = names().collect();
+        at.at(
+            entry.span(),
+            "class.gesture",
+            format!("no gesture {wanted:?}{hint} Gestures: {}", all.join(", ")),
+        )
+    })?;
+    Ok(Some(found))
+}
+
+/// A class that maps poses.
+#[allow(clippy::too_many_arguments, reason = "what a class is checked against")]
+fn direct_parts(
+    files: &Files,
+    file: &CharacterFile,
+    class: &ClassEntry,
+    path: &toml::Spanned<String>,
+    joints: &[String],
+    limits: &[JointEnvelope],
+    gesture: Option<usize>,
+    at: &Pointer<'_>,
+) -> Result<ClassParts, ConfigError> {
+    let name = class.name.get_ref();
+    if !class.clip.is_empty() {
+        let problem = "a class has clips or a map, not both; make two classes of it";
+        return Err(at.at(path.span(), "class.map", problem));
+    }
+    // Without a gesture it would never let another class begin, so it is the one that plays meanwhile.
+    let start = file.graph.start.as_ref().map(|s| s.get_ref());
+    let starts = start.or(file.class.first().map(|c| c.name.get_ref())) == Some(name);
+    if gesture.is_none() && !starts {
+        let problem = format!(
+            "class {name} maps poses and has no gesture: it is played while nothing is performed, so it must be graph.start; or give it a gesture that activates it"
+        );
+        return Err(at.at(class.name.span(), "class.map", problem));
+    }
+    let lower: Vec<f64> = limits.iter().map(|l| l.lower).collect();
+    let upper: Vec<f64> = limits.iter().map(|l| l.upper).collect();
+    let map = load_map(files, path.get_ref(), joints, &lower, &upper)
+        .map_err(|e| at.at(path.span(), "class.map", e))?;
+    Ok(ClassParts {
+        name: name.clone(),
+        gesture,
+        map: Some(map),
+        examples: Vec::new(),
+    })
 }
 
 /// Start node, edges, options.
@@ -243,7 +321,7 @@ pub(super) fn neighbourhoods(
     classes: &[ClassParts],
     gestures: usize,
 ) -> Vec<Vec<usize>> {
-    let drives_none = |gesture: &usize| classes.iter().all(|class| class.gesture != *gesture);
+    let drives_none = |gesture: &usize| classes.iter().all(|class| class.gesture != Some(*gesture));
     let everywhere: Vec<usize> = (0..gestures).filter(drives_none).collect();
     let around = |node: usize| {
         let mut near = vec![false; classes.len()];
@@ -257,7 +335,7 @@ pub(super) fn neighbourhoods(
         }
         let nodes = (0..classes.len()).filter(|other| near[*other]);
         let mut list = everywhere.clone();
-        list.extend(nodes.map(|other| classes[other].gesture));
+        list.extend(nodes.filter_map(|other| classes[other].gesture));
         list.sort_unstable();
         list.dedup();
         list
@@ -317,7 +395,8 @@ mod tests {
     fn a_neighbourhood_reaches_two_edges_far_in_both_directions() {
         let class = |gesture: usize| ClassParts {
             name: gesture.to_string(),
-            gesture,
+            gesture: Some(gesture),
+            map: None,
             examples: Vec::new(),
         };
         // A chain of five classes, driven by gestures 4 to 0; gesture 5 drives none.

@@ -8,6 +8,7 @@ pub use readers::GestureEstimate;
 
 use super::channel::{DerivedChannel, DerivedChannelError, Mixer};
 use super::tracker::{Completion, OutlierFilter, RestMeasure, SideSwaps};
+use super::{FeatureSpec, PoseFeatures};
 use super::{GestureKind, GestureSet, PerformerScale, References, TrackingCounts};
 use crate::base::angle::wrap_tau;
 use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault, channel_as_point};
@@ -51,6 +52,8 @@ pub struct FrontEnd {
     channels: Vec<f64>,
     mixer: Mixer,
     last_t: Option<f64>,
+    /// Features for pose maps, see [`FrontEnd::feature`].
+    features: Vec<PoseFeatures>,
 }
 
 impl std::fmt::Debug for FrontEnd {
@@ -96,6 +99,41 @@ impl FrontEnd {
         if set.gestures.is_empty() {
             return Err(FrontEndError::NoGestures);
         }
+        Self::build(set, stream, options, neighbourhoods)
+    }
+
+    /// The same with features for pose maps; with a feature the set may be without gesture.
+    ///
+    /// # Errors
+    /// As [`FrontEnd::new`], and features that the stream cannot give.
+    pub fn with_features(
+        set: &GestureSet,
+        stream: &PoseHeader,
+        mut options: FrontEndOptions,
+        neighbourhoods: &[Vec<usize>],
+        features: &[FeatureSpec],
+    ) -> Result<Self, FrontEndError> {
+        let features = features
+            .iter()
+            .map(|spec| PoseFeatures::new(spec, stream))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut front = if set.gestures.is_empty() && !features.is_empty() {
+            // Without gestures nobody knows how far a point may go.
+            options.trust_tracker = true;
+            Self::build(set, stream, options, neighbourhoods)?
+        } else {
+            Self::with_neighbourhoods(set, stream, options, neighbourhoods)?
+        };
+        front.features = features;
+        Ok(front)
+    }
+
+    fn build(
+        set: &GestureSet,
+        stream: &PoseHeader,
+        options: FrontEndOptions,
+        neighbourhoods: &[Vec<usize>],
+    ) -> Result<Self, FrontEndError> {
         if stream.dim != set.header.dim {
             return Err(FrontEndError::Dimension {
                 found: stream.dim,
@@ -179,6 +217,7 @@ impl FrontEnd {
             channel_names,
             mixer: Mixer::default(),
             last_t: None,
+            features: Vec::new(),
         })
     }
 
@@ -306,6 +345,10 @@ impl FrontEnd {
             }
         }
         self.mixer.mix(sample.t, &mut self.channels);
+        for feature in &mut self.features {
+            // Sees the points of its map; where they are too few it stays as it was.
+            let _ = feature.push(sample);
+        }
         self.last_t = Some(sample.t);
         Ok(())
     }
@@ -361,6 +404,11 @@ impl FrontEnd {
         ahead
     }
 
+    /// Features for pose map `index`, in the order they were asked for.
+    pub fn feature(&self, index: usize) -> Option<&PoseFeatures> {
+        self.features.get(index)
+    }
+
     /// What was removed from the last pose as global motion.
     pub fn global_motion(&self) -> GlobalMotion {
         self.motion
@@ -411,6 +459,7 @@ impl FrontEnd {
         self.local.copy_from_slice(&self.home);
         self.channels.fill(0.0);
         self.mixer.reset();
+        self.features.iter_mut().for_each(PoseFeatures::reset);
         self.motion = GlobalMotion::default();
         self.last_t = None;
     }

@@ -7,6 +7,7 @@
 
 mod channel;
 mod define;
+mod feature;
 mod file;
 mod foreign;
 mod front;
@@ -22,6 +23,7 @@ pub use channel::{DerivedChannel, DerivedChannelError, LONGEST_SMOOTHING_S};
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };
+pub use feature::{FeatureError, FeatureSpec, KERNEL_SIGMAS, PoseFeatures};
 pub use file::{GestureFileError, VERSION};
 pub use front::{FrontEnd, FrontEndError, FrontEndOptions, GestureEstimate};
 pub use period::{PeriodEstimate, find_period};

@@ -54,11 +54,15 @@ impl References {
             fit.remove(frame, None, &mut out);
             DVector::from_iterator(out.len() * 3, out.iter().flatten().copied())
         };
-        let local: Vec<Vec<DVector<f64>>> = set
+        let mut local: Vec<Vec<DVector<f64>>> = set
             .gestures
             .iter()
             .map(|gesture| gesture.frames.iter().map(&mut flat).collect())
             .collect();
+        if local.is_empty() {
+            // Without gestures (a pose map alone) the reference frame is all that is known of poses.
+            local.push(vec![flat(&set.reference)]);
+        }
         let mean: Vec<DVector<f64>> = local
             .iter()
             .map(|rows| {

@@ -13,7 +13,7 @@ use crate::config::{Character, ConfigError};
 use crate::gesture::{FrontEnd, FrontEndError, TrackingCounts};
 use crate::motion::graph::TransitionCounts;
 use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader, PoseSample};
-use crate::puppet::{LostPolicy, Puppet, PuppetOptions};
+use crate::puppet::{ClassInput, LostPolicy, Puppet, PuppetOptions};
 use std::io::BufRead;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -68,11 +68,12 @@ pub fn puppet(
     header: &PoseHeader,
     rate_hz: f64,
 ) -> Result<Puppet, SessionError> {
-    let front = FrontEnd::with_neighbourhoods(
+    let front = FrontEnd::with_features(
         &character.gestures,
         header,
         character.front_options,
         &character.neighbourhoods(),
+        &character.features(),
     )?;
     let front = character.with_channels(front)?;
     let mut animator = character.animator(&front)?;
@@ -87,7 +88,7 @@ pub fn puppet(
         front,
         animator,
         character.envelope(dt_s),
-        character.classes.iter().map(|c| c.gesture).collect(),
+        class_inputs(character),
         end_pose,
         PuppetOptions {
             dt_s,
@@ -103,6 +104,17 @@ pub fn puppet(
             },
         },
     ))
+}
+
+/// What drives each class; features are counted as in [`Character::features`].
+fn class_inputs(character: &Character) -> Vec<ClassInput> {
+    let mut features = 0..;
+    (character.classes.iter())
+        .map(|class| ClassInput {
+            gesture: class.gesture,
+            feature: class.map.as_ref().and_then(|_| features.next()),
+        })
+        .collect()
 }
 
 /// Options of the control loop for `character`.

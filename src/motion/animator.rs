@@ -1,15 +1,17 @@
 //! The animator: gesture waves and channels in, one pose out.
 
-use super::class::{Drive, MotionClass, Played};
+use super::class::{Drive, Played};
 use super::clip::RootAdvance;
 use super::graph::{Graph, Transition, TransitionCounts};
 use super::layer::Layer;
+use super::mapping::Seen;
+use super::node::Node;
 use crate::body::PoseSpace;
 
 /// Classes, the graph between them, and layers on top; all state of the character's motion.
 pub struct Animator {
     space: Box<dyn PoseSpace>,
-    classes: Vec<MotionClass>,
+    classes: Vec<Node>,
     graph: Graph,
     layers: Vec<Layer>,
     played: Vec<Played>,
@@ -34,7 +36,7 @@ impl Animator {
     /// An animator of `classes` (in the order of the graph's nodes) with `layers` on top.
     pub fn new(
         space: Box<dyn PoseSpace>,
-        classes: Vec<MotionClass>,
+        classes: Vec<Node>,
         graph: Graph,
         layers: Vec<Layer>,
     ) -> Self {
@@ -62,16 +64,20 @@ impl Animator {
         self.classes[active].rest_pose(self.space.as_ref(), out);
     }
 
+    /// Shows the performer's pose to `node`, if it is one that maps poses; before [`Animator::step`].
+    pub fn see(&mut self, node: usize, seen: Seen<'_>) {
+        if let Some(Node::Direct(class)) = self.classes.get_mut(node) {
+            class.see(seen);
+        }
+    }
+
     /// One step of `dt_s`. `drives`: one per class; `channels`: values by channel index. The pose goes
     /// into `out`. Allocates nothing.
     pub fn step(&mut self, drives: &[Drive], channels: &[f64], dt_s: f64, out: &mut [f64]) {
-        for (activation, drive) in self.activation.iter_mut().zip(drives) {
-            // A gesture in the opposite sense does not activate the class.
-            *activation = if drive.frequency_hz < 0.0 {
-                0.0
-            } else {
-                drive.amplitude
-            };
+        for ((activation, drive), class) in
+            (self.activation.iter_mut().zip(drives)).zip(&self.classes)
+        {
+            *activation = class.activation(drive);
         }
         self.graph.step(&self.activation, dt_s);
         let len = self.space.len();
@@ -120,7 +126,7 @@ impl Animator {
     }
 
     /// Classes, in node order.
-    pub fn classes(&self) -> &[MotionClass] {
+    pub fn classes(&self) -> &[Node] {
         &self.classes
     }
 

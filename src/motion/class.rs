@@ -144,6 +144,8 @@ pub struct Played {
     pub locked: bool,
     /// Travel of the body per second, in its own frame.
     pub root_velocity: RootAdvance,
+    /// Of a pose map, 0..1: how much a pair at the present pose would teach it; 0 for clips.
+    pub uncertainty: f64,
 }
 
 impl MotionClass {
@@ -382,6 +384,7 @@ impl MotionClass {
             stride: self.state.stride,
             locked: self.state.locked,
             root_velocity: velocity,
+            uncertainty: 0.0,
         }
     }
 
@@ -416,6 +419,7 @@ impl MotionClass {
             stride: 1.0,
             locked: true,
             root_velocity: RootAdvance::default(),
+            uncertainty: 0.0,
         }
     }
 

@@ -12,6 +12,8 @@ pub mod gait_frames;
 pub mod graph;
 pub mod layer;
 mod limbs;
+pub mod mapping;
+pub mod node;
 pub mod range;
 mod smooth;
 mod spline;

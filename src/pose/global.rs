@@ -17,10 +17,12 @@
 
 use super::PoseHeader;
 use crate::base::angle::wrap_pi;
+use serde::Deserialize;
 use std::f64::consts::PI;
 
 /// What is removed; `None` asks for the default of the point set.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct GlobalOptions {
     /// The point that is the body.
     pub anchor: Option<String>,

@@ -78,6 +78,19 @@ impl Recording {
         (time(self.samples.first()), time(self.samples.last()))
     }
 
+    /// The recording with every point seen in every sample ([`Recording::filled`]), without confidences.
+    ///
+    /// # Errors
+    /// The name of a point that is never seen.
+    pub fn without_gaps(mut self) -> Result<Self, String> {
+        let rows = self.filled()?;
+        for (sample, row) in self.samples.iter_mut().zip(rows) {
+            sample.points = row.into_iter().map(Some).collect();
+            sample.confidence.clear();
+        }
+        Ok(self)
+    }
+
     /// All places with the gaps filled: linearly between neighbours in time, held at the ends.
     ///
     /// One row per sample, one place per point.

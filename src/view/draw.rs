@@ -145,6 +145,17 @@ fn motion_lines(names: &Names, record: &CycleRecord) -> Vec<Line<'static>> {
                 "faster than the joints: phase not locked"
             },
         );
+        let text = if names.clips.get(node).is_some_and(Vec::is_empty) {
+            // A pose map; large where a pair would teach it much (Rhodin 2016, section 8.3).
+            format!(
+                "  {:<12} {:4.2}  unsure {}",
+                class(node),
+                played.amplitude,
+                bar(played.uncertainty, 12)
+            )
+        } else {
+            text
+        };
         lines.push(if shown {
             Line::from(text)
         } else {

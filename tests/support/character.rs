@@ -6,11 +6,31 @@ use handwave::config::{self, Character, Files};
 use handwave::live::{session, source};
 use handwave::pose::{PoseHeader, PoseSample};
 use handwave::puppet::{Inputs, Puppet, Stage};
+use std::path::Path;
 
 pub const RATE_HZ: f64 = 200.0;
 
 pub fn built_in() -> Character {
     config::load(Files::Embedded, BUILT_IN).expect("the built-in character")
+}
+
+/// Every character that ships, by the name of its file in `configs`.
+pub fn shipped() -> Vec<(String, Character)> {
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    let mut files: Vec<_> = std::fs::read_dir(configs)
+        .expect("configs")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .collect();
+    files.sort();
+    files
+        .iter()
+        .map(|path| {
+            let (files, name) = Files::of(path);
+            let character = config::load(files, &name).unwrap_or_else(|e| panic!("{e}"));
+            (name, character)
+        })
+        .collect()
 }
 
 /// Header and samples of the bundled performance.

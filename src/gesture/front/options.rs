@@ -1,6 +1,6 @@
 //! What a front end may be told, and why it cannot be made.
 
-use crate::gesture::{EstimatorKind, PerformerScale};
+use crate::gesture::{EstimatorKind, FeatureError, PerformerScale};
 
 /// What may differ between uses of the same gesture file.
 #[derive(Copy, Clone, Debug, Default, PartialEq)]
@@ -45,6 +45,9 @@ pub enum FrontEndError {
         /// The anchor's name.
         anchor: String,
     },
+    /// The features of a pose map.
+    #[error("{0}")]
+    Feature(#[from] FeatureError),
     /// An option out of range.
     #[error("option {key}: found {found}; allowed: {allowed}")]
     Option {
