@@ -6,11 +6,16 @@
 
 mod define;
 mod file;
+mod frames;
 mod front;
 mod period;
 mod plane;
 mod separability;
 mod set;
+mod teach;
+mod teach_guidance;
+mod teach_search;
+mod teach_words;
 mod wave;
 
 pub use define::{
@@ -22,4 +27,7 @@ pub use period::{PeriodEstimate, find_period};
 pub use plane::{Plane, References};
 pub use separability::{Response, responses};
 pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
+pub use teach::Teacher;
+pub use teach_guidance::{Guidance, Novelty};
+pub use teach_words::{Mark, TeachError, TeachOptions, TeachPhase, TeachView};
 pub use wave::{Estimator, EstimatorKind, GaborEstimator, LONGEST_GAP_S, PlanePoint, WaveEstimate};
