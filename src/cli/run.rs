@@ -9,7 +9,7 @@ use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files};
 use crate::live::control::Ending;
 use crate::live::session::{self, Observer, Report, Session};
-use crate::live::source::{self, SourceReader};
+use crate::live::source::{self, Source, SourceError};
 use crate::live::wire::{self, WireError};
 use crate::live::{CycleRecord, RealClock, StopSwitch};
 use crate::sim::FaultSpec;
@@ -44,6 +44,8 @@ pub const EXAMPLES: &str = "Examples:
   handwave run                                        the built-in quadruped, simulated, with a recorded performer
   handwave run --bus dynamixel:/dev/ttyUSB0@1000000   the same on real servos
   handwave run my_robot.toml --input file:take3.jsonl
+  handwave run my_robot.toml --input udp://7000       live: pose-stream JSON, one object a datagram, header first
+  my_tracker | handwave run my_robot.toml --input -   live from a pipe (JSON Lines or CSV)
   handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
@@ -53,7 +55,8 @@ Exit codes: 0 done, 2 bad usage, config or input, 3 bus failure, 4 safety stop, 
 /// Options of `handwave run`.
 #[derive(Args, Debug, Default)]
 pub struct RunOptions {
-    /// Pose source in place of the configuration's, such as file:take.jsonl
+    /// Pose source in place of the configuration's: file:take.jsonl, udp://[ADDRESS:]PORT (this machine
+    /// only without an address), - (standard input). A live one plays until Ctrl-C, --duration or its end
     #[arg(long, value_name = "SOURCE")]
     input: Option<String>,
     /// Bus in place of the configuration's: sim, dynamixel:PATH@BAUD
@@ -129,11 +132,27 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             "--speed max would drive the servos on a real bus faster than real time; it works with --bus sim only",
         ));
     }
-    let reader = match &options.input {
-        Some(input) => source::open(input, &source::working_folder()),
-        None => source::open(&character.source, &character.files),
+    if let Some(input) = &options.input {
+        character.source.clone_from(input);
     }
-    .map_err(Failure::input)?;
+    let live = source::is_live(&character.source);
+    if live && options.speed == Speed::Max {
+        return Err(Failure::input(format!(
+            "--speed max takes time from a recording; {} is live and has none to give: leave --speed out, or record it first",
+            character.source
+        )));
+    }
+    let stop = StopSwitch::new();
+    stop.on_signals()
+        .map_err(|e| Failure::input(format!("cannot listen for signals: {e}")))?;
+    let folder = match &options.input {
+        Some(_) => source::working_folder(),
+        None => character.files.clone(),
+    };
+    let source = match source::open_any(&character.source, &folder, &stop) {
+        Err(SourceError::Interrupted) => return Ok(ExitStatus::Interrupted),
+        opened => opened.map_err(Failure::input)?,
+    };
     let targets = options
         .targets
         .as_ref()
@@ -145,9 +164,6 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
     if let Some(problem) = wire::too_slow(&character, &character.bus, rate_hz) {
         warn(format_args!("warning: {problem}"));
     }
-    let stop = StopSwitch::new();
-    stop.on_signals()
-        .map_err(|e| Failure::input(format!("cannot listen for signals: {e}")))?;
     let mut onlooker = Onlooker {
         targets,
         display: Display::Quiet,
@@ -157,7 +173,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         Speed::Max => {
             let clock = VirtualClock::new();
             let shared: Arc<dyn Clock> = Arc::new(clock.clone());
-            let session = session(options, &character, rate_hz, reader, faults, shared, stop)?;
+            let session = session(options, &character, rate_hz, source, faults, shared, stop)?;
             session::run_virtual(session, &clock, &mut onlooker)
         }
         Speed::Real => {
@@ -169,7 +185,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
                 options,
                 &character,
                 rate_hz,
-                reader,
+                source,
                 faults,
                 Arc::clone(&clock),
                 stop,
@@ -212,13 +228,20 @@ fn session(
     options: &RunOptions,
     character: &Character,
     rate_hz: f64,
-    mut reader: SourceReader,
+    mut source: Source,
     faults: Vec<FaultSpec>,
     clock: Arc<dyn Clock>,
     stop: StopSwitch,
 ) -> Result<Session<Box<dyn BufRead + Send>>, Failure> {
-    let first = source::first_sample(&mut reader).map_err(Failure::input)?;
-    let puppet = session::puppet(character, reader.header(), rate_hz).map_err(Failure::input)?;
+    let first = source.first_sample().map_err(|e| match e {
+        SourceError::Interrupted => Failure {
+            status: ExitStatus::Interrupted,
+            message: e.to_string(),
+        },
+        other => Failure::input(other),
+    })?;
+    let puppet =
+        session::puppet(character, source.reader.header(), rate_hz).map_err(Failure::input)?;
     let wire = wire::open(character, &character.bus, clock, rate_hz).map_err(|e| match e {
         WireError::Port(_) => Failure::bus(e),
         other => Failure::input(other),
@@ -227,8 +250,9 @@ fn session(
     Ok(Session {
         puppet,
         bus: wire.bus,
-        reader,
+        reader: source.reader,
         first,
+        live: source.live,
         stop,
         options: session::control_options(character, rate_hz, options.duration),
         on_start: Box::new(move |start| {

@@ -4,6 +4,7 @@
 //! [`control`] is the loop: one cycle reads samples, steps the puppet, exchanges with the bus.
 //! [`session`] runs it, on a thread in real time or inline in virtual time.
 
+pub mod arrival;
 pub mod clock;
 pub mod control;
 pub mod feed;

@@ -1,5 +1,6 @@
 //! A session: a character, its poses and its bus, run to the end in real or in virtual time.
 
+use super::arrival::Hangup;
 use super::control::{self, ControlOptions, Ending, Outcome, Parts};
 use super::feed::{ReaderFeed, read_ahead};
 use super::realtime::{self, RealTime};
@@ -32,6 +33,8 @@ pub struct Report {
     pub transitions: TransitionCounts,
     /// Pose samples dropped, by reason.
     pub dropped: FaultCounts,
+    /// Datagrams of a live source that came before its header.
+    pub before_header: u64,
     /// Samples that the front end refused.
     pub refused: u64,
     /// Why the pose stream ended early, if it did.
@@ -126,6 +129,8 @@ pub struct Session<R> {
     pub reader: PoseReader<R>,
     /// The first sample: a stream without one is found out before anything moves.
     pub first: PoseSample,
+    /// How the reader is ended when it is live; its samples are then due on arrival.
+    pub live: Option<Hangup>,
     /// Signals and keys.
     pub stop: StopSwitch,
     /// Rate, duration, what happens at the end.
@@ -178,7 +183,7 @@ pub fn run_real<R: BufRead + Send + 'static>(
     observer: &mut dyn Observer,
     tick_hz: f64,
 ) -> Result<Report, SessionError> {
-    let (mut feed, reading) = read_ahead(session.reader, session.first)?;
+    let (mut feed, reading) = read_ahead(session.reader, session.first, session.live.is_some())?;
     let (mut recorder, mut records) = record_queue(&session.puppet, RECORDS);
     let (mut puppet, mut bus, mut on_start) = (session.puppet, session.bus, session.on_start);
     let (stop, options) = (session.stop, session.options);
@@ -224,20 +229,20 @@ pub fn run_real<R: BufRead + Send + 'static>(
             "the control thread ended abnormally; the servos' own watchdog stops them",
         )));
     };
-    // A source that blocks (a pipe nobody writes to) must not hold up the end; its thread dies with us.
-    let read = if reading.is_finished() {
+    if let Some(live) = &session.live {
+        live.close();
+    }
+    // A source that blocks (a file on a device that hangs) must not hold up the end; its thread dies with us.
+    let read = if session.live.is_some() || reading.is_finished() {
         reading.join().unwrap_or_default()
     } else {
         Default::default()
     };
-    Ok(report(
-        outcome,
-        &puppet,
-        bus.as_ref(),
-        read,
-        lost,
-        Some(real_time),
-    ))
+    let report = report(outcome, &puppet, bus.as_ref(), read, lost, Some(real_time));
+    Ok(Report {
+        before_header: session.live.map_or(0, |live| live.before_header()),
+        ..report
+    })
 }
 
 fn report(
@@ -254,6 +259,7 @@ fn report(
         torque: outcome.torque,
         transitions: puppet.animator().counts(),
         dropped,
+        before_header: 0,
         refused: puppet.rejected_samples(),
         pose_error,
         records_lost,
