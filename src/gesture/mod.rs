@@ -4,6 +4,7 @@
 //! what is left to one complex number (or a progression), and an [`Estimator`] reads amplitude,
 //! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
 
+mod confusion;
 mod define;
 mod file;
 mod frames;
@@ -18,6 +19,7 @@ mod teach_search;
 mod teach_words;
 mod wave;
 
+pub use confusion::{Confusion, Reading, STARTS, Verdict, confusion, sizes_m};
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };
