@@ -3,6 +3,8 @@
 mod check;
 mod define;
 mod estimate;
+mod report;
+mod teach;
 
 use super::{ExitStatus, Failure};
 use crate::gesture::GestureSet;
@@ -18,16 +20,27 @@ pub struct GestureArgs {
 
 #[derive(Subcommand, Debug)]
 enum GestureCommand {
-    /// Define a gesture from one example in a recording.
+    /// Define a gesture from one example, marked in a recording or shown live.
     #[command(after_help = "Examples:
   handwave gesture define --poses waiting.csv --name drum --start 0.52 --into hand.toml
       one period from the start mark; its end is found
   handwave gesture define --poses waiting.csv --name drum --start 0.52 --end 1.60 --into hand.toml
   handwave gesture define --poses splay.csv --name splay --rest 0.60 --extreme 0.90 --into hand.toml
       a movement that does not repeat
+  handwave gesture define --input udp://7000 --name wave --into hand.toml
+      live: space (Enter, Page Down: presenter remotes, pedals) begins; the end is found after two to three
+      periods, or marked by another press; then space keeps it, r is once more, q leaves
+  handwave gesture define --input udp://7000 --name wave --start-after 3 --into hand.toml
+      hands-free: three seconds after the first pose
+  handwave gesture define --input udp://7000 --name bow --kind non-cyclic --start-after 3 --into hand.toml
+      hold the rest pose until the count-down ends, go to the extreme and stay (or come back)
+  handwave gesture define --input file:waiting.csv --name drum --start-after 0.5 --speed max --into hand.toml
 
-Adds to the gesture file, or replaces the gesture of the same name.")]
-    Define(define::DefineArgs),
+Adds to the gesture file, or replaces the gesture of the same name. Live, a bar shows how new the movement
+is against what is defined already: red is known and will be confused, green is new. A quality report
+follows; a gesture that reads less than 0.2 of itself when it is played back cannot start anything and is
+not written (exit 2) without --force. A recording's marks are taken as they are, with warnings.")]
+    Define(Box<define::DefineArgs>),
     /// Run an estimator over a recording: one row per gesture and sample.
     #[command(after_help = "Examples:
   handwave gesture estimate --gestures hand.toml --poses performance.jsonl --out waves.csv
@@ -65,8 +78,10 @@ amplitude is the progression, frequency 0. A sample that is dropped has no row."
     #[command(after_help = "Examples:
   handwave gesture check --gestures hand.toml
 
-Each row: the frames of one gesture shown to the plane of another. A plane should answer 1 to its
-own gesture and 0 to all others; above 0.2 the two may be confused.")]
+First table: the frames of one gesture shown to the plane of another. A plane should answer 1 to its own
+gesture and 0 to all others; above 0.2 the two may be confused. Second table: every gesture performed at 0.5,
+1 and 1.5 times its speed and at half and full size through the whole estimator, and what every gesture then
+reads. Then a verdict on each, with advice. --json: one row per line, \"table\" says which.")]
     Check {
         /// The gesture file.
         #[arg(long)]

@@ -8,12 +8,14 @@ pub mod arrival;
 pub mod clock;
 pub mod control;
 pub mod feed;
+pub mod keys;
 pub mod realtime;
 pub mod record;
 pub mod session;
 pub mod source;
 pub mod stats;
 pub mod stop;
+pub mod teach;
 pub mod wire;
 
 pub use clock::RealClock;

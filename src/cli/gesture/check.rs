@@ -1,8 +1,9 @@
 //! `handwave gesture list` and `check`: what a gesture file holds, and how well its gestures differ.
 
 use super::load;
+use super::report::{say_confusion, say_planes};
 use crate::cli::{ExitStatus, Failure, say};
-use crate::gesture::responses;
+use crate::gesture::{FrontEndOptions, confusion, responses};
 use std::path::Path;
 
 pub(super) fn list(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
@@ -43,30 +44,9 @@ pub(super) fn check(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
             path.display()
         ))
     })?;
-    if !json {
-        say(format_args!(
-            "{:<16} {:<16} {:>7} {:>8}  ",
-            "plane of", "shown", "mean", "largest"
-        ));
-    }
-    for response in table {
-        let plane = &set.gestures[response.gesture].name;
-        let shown = &set.gestures[response.shown].name;
-        let confusable = response.gesture != response.shown && response.largest > 0.2;
-        if json {
-            let object = serde_json::json!({
-                "gesture": plane, "shown": shown, "mean": response.mean,
-                "largest": response.largest, "confusable": confusable,
-            });
-            say(format_args!("{object}"));
-        } else {
-            say(format_args!(
-                "{plane:<16} {shown:<16} {:>7.3} {:>8.3}  {}",
-                response.mean,
-                response.largest,
-                if confusable { "may be confused" } else { "" }
-            ));
-        }
-    }
+    let played = confusion(&set, FrontEndOptions::default())
+        .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+    say_planes(&set, &table, json);
+    say_confusion(&set, &played, json);
     Ok(ExitStatus::Done)
 }
