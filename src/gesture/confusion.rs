@@ -97,6 +97,26 @@ pub fn sizes_m(set: &GestureSet) -> Result<Vec<f64>, String> {
 /// # Errors
 /// No gesture, an anchor that is no point, options out of range.
 pub fn confusion(set: &GestureSet, options: FrontEndOptions) -> Result<Confusion, FrontEndError> {
+    played(set, options, None)
+}
+
+/// The same as far as gesture `index` is concerned: the others are performed only as they were shown.
+///
+/// # Errors
+/// As [`confusion`].
+pub fn confusion_of(
+    set: &GestureSet,
+    options: FrontEndOptions,
+    index: usize,
+) -> Result<Confusion, FrontEndError> {
+    played(set, options, Some(index))
+}
+
+fn played(
+    set: &GestureSet,
+    options: FrontEndOptions,
+    only: Option<usize>,
+) -> Result<Confusion, FrontEndError> {
     let mut readings = Vec::new();
     let mut front = FrontEnd::new(set, &set.header, options)?;
     for (performed, gesture) in set.gestures.iter().enumerate() {
@@ -107,6 +127,10 @@ pub fn confusion(set: &GestureSet, options: FrontEndOptions) -> Result<Confusion
                 continue;
             }
             for size in SIZES {
+                let as_shown = speed == 1.0 && size == 1.0;
+                if only.is_some_and(|only| only != performed) && !as_shown {
+                    continue;
+                }
                 let read = perform(&mut front, gesture, speed, size);
                 readings.extend(read.into_iter().enumerate().map(|(read, (mean, largest))| {
                     Reading {
@@ -238,13 +262,12 @@ impl Confusion {
 
     fn verdict(&self, gesture: usize) -> Verdict {
         let others = (0..self.names.len()).filter(|other| *other != gesture);
-        let confused: Vec<(usize, f64, f64)> = others
+        let pairs: Vec<(usize, f64, f64)> = others
             .clone()
             .map(|other| {
                 let there = self.largest(gesture, other);
                 (other, there, self.largest(other, gesture))
             })
-            .filter(|(_, there, back)| there.max(*back) > STARTS)
             .collect();
         let own = (self.own(gesture))
             .find(|(speed, _)| *speed == 1.0)
@@ -254,15 +277,26 @@ impl Confusion {
                 (1.0, own),
                 |least, now| if now.1 < least.1 { now } else { least },
             );
+        // Twins share what one alone would read: against a weak gesture a small answer is no small one.
+        let starts = STARTS.min(0.5 * own);
+        let confused: Vec<(usize, f64, f64)> = pairs
+            .into_iter()
+            .filter(|(_, there, back)| there.max(*back) > starts)
+            .collect();
         let name = &self.names[gesture];
         let mut words = Vec::new();
+        let cause = if confused.is_empty() {
+            "show it larger and steadier"
+        } else {
+            "it shares its movement with others"
+        };
         if own < STARTS {
             words.push(format!(
-                "`{name}` cannot work: performed as it was shown it reads {own:.2}, and {STARTS} starts a motion; show it larger and steadier, or make it differ more from the others"
+                "`{name}` cannot work: performed as it was shown it reads {own:.2}, and {STARTS} starts a motion: {cause}"
             ));
         } else if own < WEAK {
             words.push(format!(
-                "`{name}` is weak: performed as it was shown it reads {own:.2} instead of 1; show it larger, or make it differ more from the others"
+                "`{name}` is weak: performed as it was shown it reads {own:.2} instead of 1: {cause}"
             ));
         } else if least_own < WEAK {
             words.push(format!(
@@ -272,7 +306,7 @@ impl Confusion {
         for (other, there, back) in &confused {
             let other = &self.names[*other];
             let advice = "make them differ more, or put them more than two edges apart";
-            words.push(if there.min(*back) > STARTS {
+            words.push(if there.min(*back) > starts {
                 format!("`{name}` and `{other}` answer to each other ({there:.2} and {back:.2}): {advice}")
             } else if there > back {
                 format!("`{other}` answers {there:.2} while `{name}` is performed: {advice}")

@@ -19,7 +19,7 @@ mod teach_search;
 mod teach_words;
 mod wave;
 
-pub use confusion::{Confusion, Reading, STARTS, Verdict, confusion, sizes_m};
+pub use confusion::{Confusion, Reading, STARTS, Verdict, confusion, confusion_of, sizes_m};
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
 };

@@ -3,7 +3,7 @@
 use crate::cli::say;
 use crate::gesture::{
     Confusion, Definition, FrontEndOptions, Gesture, GestureKind, GestureSet, Response, Verdict,
-    confusion, responses, sizes_m,
+    confusion_of, responses, sizes_m,
 };
 use crate::pose::global::size_of;
 use serde_json::{Value, json};
@@ -45,7 +45,8 @@ impl Quality {
             .filter(|(other, _)| *other != index)
             .map(|(o, g)| (g.name.clone(), answer(index, o).max(answer(o, index))))
             .collect();
-        let played = confusion(set, FrontEndOptions::default()).map_err(|e| e.to_string())?;
+        let played =
+            confusion_of(set, FrontEndOptions::default(), index).map_err(|e| e.to_string())?;
         Ok(Self {
             periodicity: definition.periodicity,
             closure: definition.closure,

@@ -7,7 +7,7 @@ use crate::cli::run::Speed;
 use crate::cli::{ExitStatus, Failure, warn};
 use crate::gesture::{
     FrontEndOptions, GestureKind, GestureSet, TeachError, TeachOptions, TeachPhase, TeachView,
-    Teacher, confusion,
+    Teacher, confusion_of,
 };
 use crate::live::feed::{Feed, ReaderFeed, read_ahead};
 use crate::live::keys::Keys;
@@ -15,6 +15,13 @@ use crate::live::source::{self, SourceError};
 use crate::live::teach::{Lesson, Taught, teach};
 use crate::live::{RealClock, StopSwitch};
 use std::io::{IsTerminal, Write};
+
+/// A source as the gesture file tells it: without the folders of one person's machine.
+fn shown(input: &str) -> String {
+    let path = input.strip_prefix("file:").map(std::path::Path::new);
+    let name = path.and_then(std::path::Path::file_name);
+    name.map_or_else(|| input.into(), |name| name.to_string_lossy().into_owned())
+}
 
 /// Width of the red-to-green bar.
 const BAR: usize = 20;
@@ -84,7 +91,7 @@ pub(super) fn run(args: &DefineArgs, input: &str) -> Result<ExitStatus, Failure>
     }
     let options = TeachOptions {
         name: args.name.clone(),
-        source: format!("{input}, taught"),
+        source: format!("{}, taught", shown(input)),
         kind: args.kind.into(),
         count_down_s: args.start_after.unwrap_or(args.count_down),
         hands_free,
@@ -220,10 +227,12 @@ impl Screen {
                 self.break_line();
                 let mut with = self.set.clone();
                 with.put(definition.gesture.clone());
-                let verdict = confusion(&with, FrontEndOptions::default()).map(|c| c.verdicts());
-                let index = with.index_of(&definition.gesture.name);
-                if let (Ok(verdicts), Some(index)) = (verdict, index) {
-                    warn(format_args!("{}", verdicts[index].words));
+                let verdict = with.index_of(&definition.gesture.name).and_then(|index| {
+                    let played = confusion_of(&with, FrontEndOptions::default(), index).ok()?;
+                    played.verdicts().into_iter().nth(index)
+                });
+                if let Some(verdict) = verdict {
+                    warn(format_args!("{}", verdict.words));
                 }
             }
             (TeachPhase::Failed, Some(Err(error))) if self.asks && !self.judged => {
