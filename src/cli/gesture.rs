@@ -1,8 +1,9 @@
-//! `handwave gesture`: define gestures, estimate their waves over a recording, check a set.
+//! `handwave gesture`: define gestures, estimate their waves over a recording, check and share them.
 
 mod check;
 mod define;
 mod estimate;
+mod library;
 mod report;
 mod teach;
 
@@ -11,7 +12,7 @@ use crate::gesture::GestureSet;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
-/// Gestures: define, estimate, list, check.
+/// Gestures: define, estimate, check, list, copy, remove.
 #[derive(Args, Debug)]
 pub struct GestureArgs {
     #[command(subcommand)]
@@ -62,17 +63,55 @@ amplitude is the progression, frequency 0. A sample that is dropped has no row."
         #[arg(long, default_value = "default")]
         estimator: String,
     },
-    /// The gestures of a file.
+    /// The gestures of files and folders.
     #[command(after_help = "Examples:
-  handwave gesture list --gestures hand.toml
-  handwave gesture list --gestures hand.toml --json")]
+  handwave gesture list hand.toml
+  handwave gesture list ~/gestures other.toml --json")]
     List {
-        /// The gesture file.
+        /// Gesture files, and folders that hold some.
+        #[arg(value_name = "DIR|FILE", required_unless_present = "gestures")]
+        places: Vec<PathBuf>,
+        /// The gesture file (the same as naming it).
         #[arg(long)]
-        gestures: PathBuf,
+        gestures: Option<PathBuf>,
         /// JSON Lines instead of a table.
         #[arg(long)]
         json: bool,
+    },
+    /// Take a gesture from another file.
+    #[command(after_help = "Examples:
+  handwave gesture copy --from shared.toml --name wave --into hand.toml
+  handwave gesture copy --from shared.toml --name wave --as hello --into hand.toml
+
+Both files must track the same points (in any order). Lengths stay as they were shown. A new file is a copy of
+the other one with this gesture alone.")]
+    Copy {
+        /// The file that has it.
+        #[arg(long, value_name = "A.toml")]
+        from: PathBuf,
+        /// The gesture.
+        #[arg(long)]
+        name: String,
+        /// Its name in the other file.
+        #[arg(long, value_name = "NAME")]
+        r#as: Option<String>,
+        /// The file that gets it; made when it does not exist.
+        #[arg(long, value_name = "B.toml")]
+        into: PathBuf,
+        /// In place of a gesture of that name.
+        #[arg(long)]
+        replace: bool,
+    },
+    /// Remove a gesture from a file.
+    #[command(after_help = "Examples:
+  handwave gesture remove --gestures hand.toml --name wave")]
+    Remove {
+        /// The gesture file.
+        #[arg(long, alias = "from")]
+        gestures: PathBuf,
+        /// The gesture.
+        #[arg(long)]
+        name: String,
     },
     /// How well the gestures of a file can be told apart.
     #[command(after_help = "Examples:
@@ -105,7 +144,28 @@ pub fn run(args: GestureArgs) -> Result<ExitStatus, Failure> {
             out,
             estimator,
         } => estimate::estimate(&gestures, &poses, &out, &estimator),
-        GestureCommand::List { gestures, json } => check::list(&gestures, json),
+        GestureCommand::List {
+            places,
+            gestures,
+            json,
+        } => {
+            let places: Vec<PathBuf> = places.into_iter().chain(gestures).collect();
+            library::list(&places, json)
+        }
+        GestureCommand::Copy {
+            from,
+            name,
+            r#as,
+            into,
+            replace,
+        } => library::copy(&library::Copy {
+            from: &from,
+            name: &name,
+            new_name: r#as.as_deref(),
+            into: &into,
+            replace,
+        }),
+        GestureCommand::Remove { gestures, name } => library::remove(&gestures, &name),
         GestureCommand::Check { gestures, json } => check::check(&gestures, json),
     }
 }

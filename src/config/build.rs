@@ -356,19 +356,22 @@ fn gesture_set(
     file: &CharacterFile,
     at: &Pointer<'_>,
 ) -> Result<GestureSet, ConfigError> {
-    let entry = match file.gesture.as_slice() {
-        [entry] => entry,
-        other => {
-            return Err(at.key(
-                "gesture",
-                format!(
-                    "{} gesture files are named; give one [[gesture]] file, which may define many gestures",
-                    other.len()
-                ),
-            ));
+    let mut merged: Option<(GestureSet, String)> = None;
+    for entry in &file.gesture {
+        let wrong = |e: &dyn std::fmt::Display| at.at(entry.file.span(), "gesture.file", e);
+        let text = read(files, &entry.file, "gesture.file", at)?;
+        let name = files.name(entry.file.get_ref());
+        let set = GestureSet::from_toml(&text, &name).map_err(|e| wrong(&e))?;
+        match &mut merged {
+            None => merged = Some((set, name)),
+            Some((first, first_name)) => {
+                first
+                    .merge(&set, first_name, &name)
+                    .map_err(|e| wrong(&e))?;
+            }
         }
-    };
-    let text = read(files, &entry.file, "gesture.file", at)?;
-    GestureSet::from_toml(&text, &files.name(entry.file.get_ref()))
-        .map_err(|e| at.at(entry.file.span(), "gesture.file", e))
+    }
+    let none = "no gesture file; give [[gesture]] file = \"gestures/hand.toml\"";
+    let (set, _) = merged.ok_or_else(|| at.key("gesture", none))?;
+    Ok(set)
 }

@@ -9,6 +9,7 @@ mod define;
 mod file;
 mod frames;
 mod front;
+mod library;
 mod period;
 mod plane;
 mod separability;
@@ -25,6 +26,7 @@ pub use define::{
 };
 pub use file::{GestureFileError, VERSION};
 pub use front::{FrontEnd, FrontEndError, FrontEndOptions, GestureEstimate};
+pub use library::{About, LibraryError};
 pub use period::{PeriodEstimate, find_period};
 pub use plane::{Plane, References};
 pub use separability::{Response, responses};
