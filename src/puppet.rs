@@ -106,6 +106,28 @@ pub struct Puppet {
     targets: Targets,
 }
 
+/// Gestures with all that a puppet needs to go by them: made anywhere, taken over in a cycle.
+#[derive(Debug)]
+pub struct Gestures {
+    /// Reads the gestures.
+    pub front: FrontEnd,
+    gesture_of_class: Vec<usize>,
+    estimates: Vec<GestureEstimate>,
+    channels: Vec<f64>,
+}
+
+impl Gestures {
+    /// `gesture_of_class`: per class of the animator the index of its gesture in `front`.
+    pub fn new(front: FrontEnd, gesture_of_class: Vec<usize>) -> Self {
+        Self {
+            estimates: front.estimates().to_vec(),
+            channels: vec![f64::NAN; front.channel_names().len()],
+            front,
+            gesture_of_class,
+        }
+    }
+}
+
 /// An eased way between two poses.
 #[derive(Clone, Debug, Default)]
 struct Ramp {
@@ -221,6 +243,23 @@ impl Puppet {
         self.targets.held_back = self.envelope.pass(&self.pose, &mut self.targets.positions);
         self.targets.stage = self.stage;
         &self.targets
+    }
+
+    /// Goes by other gestures from now on; `other` then holds the old ones. False, and nothing changed, when
+    /// they are for another number of classes.
+    ///
+    /// The animator keeps its state, so the motion goes on: amplitude, tempo and phase are drawn to the new
+    /// estimates as they are to any. Shown the same past, new gestures that are like the old ones read alike.
+    /// Allocates and frees nothing.
+    pub fn swap_gestures(&mut self, other: &mut Gestures) -> bool {
+        if other.gesture_of_class.len() != self.gesture_of_class.len() {
+            return false;
+        }
+        std::mem::swap(&mut self.front, &mut other.front);
+        std::mem::swap(&mut self.gesture_of_class, &mut other.gesture_of_class);
+        std::mem::swap(&mut self.estimates, &mut other.estimates);
+        std::mem::swap(&mut self.channels, &mut other.channels);
+        true
     }
 
     /// Drives the animator from the gestures; `share` 0 releases them.

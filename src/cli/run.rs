@@ -6,8 +6,9 @@ use super::{ExitStatus, Failure, say, warn};
 use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
 use crate::config::files::BUILT_IN;
-use crate::config::{self, Character, Files};
+use crate::config::{self, Character, Files, GestureFiles};
 use crate::live::control::Ending;
+use crate::live::reload::News;
 use crate::live::session::{self, Observer, Report, Session};
 use crate::live::source::{self, Source, SourceError};
 use crate::live::wire::{self, WireError};
@@ -81,6 +82,9 @@ pub struct RunOptions {
     /// (`handwave sim dynamixel --list-faults`)
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
+    /// Load changed gesture files while the run goes on (with live sources it does so by itself)
+    #[arg(long)]
+    watch: bool,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -168,6 +172,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         targets,
         display: Display::Quiet,
         newest: CycleRecord::default(),
+        later: Vec::new(),
     };
     let report = match options.speed {
         Speed::Max => {
@@ -195,6 +200,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             ran.map_err(Failure::input)?
         }
     };
+    for line in &onlooker.later {
+        warn(format_args!("{line}"));
+    }
     let written = onlooker.targets.map_or(Ok(()), TargetsFile::finish);
     conclude(options, report, written, &character)
 }
@@ -223,6 +231,27 @@ fn faults(options: &RunOptions, character: &Character) -> Result<Vec<FaultSpec>,
         .collect()
 }
 
+/// The gesture files to watch, if any: by --watch, by the configuration, or because the source is live.
+fn reload(
+    options: &RunOptions,
+    character: &Character,
+    live: bool,
+) -> Result<Option<GestureFiles>, Failure> {
+    let files = &character.gesture_files;
+    if options.watch && !files.can_change() {
+        return Err(Failure::input(
+            "--watch: the gestures of the built-in quadruped are part of the program; copy configs/quadruped.toml and its parts, and run that",
+        ));
+    }
+    if options.watch && options.speed == Speed::Max {
+        return Err(Failure::input(
+            "--watch works by the clock; --speed max has none: leave one of them out",
+        ));
+    }
+    let wanted = options.watch || character.reload.unwrap_or(live);
+    Ok((wanted && files.can_change()).then(|| files.clone()))
+}
+
 /// Opens the bus and puts the session together.
 fn session(
     options: &RunOptions,
@@ -233,6 +262,7 @@ fn session(
     clock: Arc<dyn Clock>,
     stop: StopSwitch,
 ) -> Result<Session<Box<dyn BufRead + Send>>, Failure> {
+    let reload = reload(options, character, source.live.is_some())?;
     let first = source.first_sample().map_err(|e| match e {
         SourceError::Interrupted => Failure {
             status: ExitStatus::Interrupted,
@@ -253,6 +283,7 @@ fn session(
         reader: source.reader,
         first,
         live: source.live,
+        reload,
         stop,
         options: session::control_options(character, rate_hz, options.duration),
         on_start: Box::new(move |start| {
@@ -322,6 +353,8 @@ struct Onlooker {
     targets: Option<TargetsFile>,
     display: Display,
     newest: CycleRecord,
+    /// What could not be said while the view had the terminal.
+    later: Vec<String>,
 }
 
 impl Observer for Onlooker {
@@ -335,5 +368,16 @@ impl Observer for Onlooker {
 
     fn tick(&mut self) {
         self.display.draw(&self.newest);
+    }
+
+    fn news(&mut self, news: &News) {
+        if let News::Gestures(names) = news {
+            self.display.rename_gestures(names);
+        }
+        if self.display.shares_the_terminal() {
+            warn(format_args!("{news}"));
+        } else {
+            self.later.push(news.to_string());
+        }
     }
 }

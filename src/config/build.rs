@@ -1,8 +1,9 @@
 //! From a configuration to checked parts: every file read, every name resolved, every number in range.
 
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, OnExit, OnLost, OnServoFault};
+use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
+use super::gestures::{GestureFiles, merged};
 use super::motion::{
     ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts, read,
 };
@@ -42,6 +43,10 @@ pub struct Character {
     pub gestures: GestureSet,
     /// How gestures are read.
     pub front_options: FrontEndOptions,
+    /// The files they came from.
+    pub gesture_files: GestureFiles,
+    /// Whether changed gesture files are loaded while a run goes on; `None`: with live sources.
+    pub reload: Option<bool>,
     /// Envelope limits in model order.
     pub limits: Vec<JointEnvelope>,
     /// Class names with the gesture that drives each, in node order.
@@ -102,7 +107,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let limits = envelope_limits(&file, &model);
     let servos = servo_map(&file, &model, &at)?;
     let ranges = joint_ranges(&limits);
-    let gestures = gesture_set(&files, &file, &at)?;
+    let (gestures, paths, texts) = gesture_set(&files, &file, &at)?;
     let classes = class_parts(&files, &file, &joints, &gestures, &at)?;
     for class in &classes {
         for example in &class.examples {
@@ -158,14 +163,23 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     };
     let bus = file.bus.bus.parse().map_err(|e| at.key("bus.bus", e))?;
     let safety = &file.safety;
+    let front_options = FrontEndOptions {
+        estimator,
+        lambda: file.input.window,
+    };
     let character = Character {
         name: file.name.clone(),
         config_name: file_name.clone(),
         source: file.input.source.get_ref().clone(),
-        front_options: FrontEndOptions {
-            estimator,
-            lambda: file.input.window,
-        },
+        gesture_files: GestureFiles::new(
+            &files,
+            (paths, texts),
+            front_options,
+            &gestures,
+            &classes,
+        ),
+        front_options,
+        reload: file.input.reload,
         safety: Safety {
             ramp_s: safety.ramp_s,
             end_ramp_s: safety.end_ramp_s,
@@ -351,27 +365,19 @@ fn envelope_limits(file: &CharacterFile, model: &RobotModel) -> Vec<JointEnvelop
         .collect()
 }
 
+/// All gesture files as one set, with their paths and texts.
 fn gesture_set(
     files: &Files,
     file: &CharacterFile,
     at: &Pointer<'_>,
-) -> Result<GestureSet, ConfigError> {
-    let mut merged: Option<(GestureSet, String)> = None;
-    for entry in &file.gesture {
-        let wrong = |e: &dyn std::fmt::Display| at.at(entry.file.span(), "gesture.file", e);
-        let text = read(files, &entry.file, "gesture.file", at)?;
-        let name = files.name(entry.file.get_ref());
-        let set = GestureSet::from_toml(&text, &name).map_err(|e| wrong(&e))?;
-        match &mut merged {
-            None => merged = Some((set, name)),
-            Some((first, first_name)) => {
-                first
-                    .merge(&set, first_name, &name)
-                    .map_err(|e| wrong(&e))?;
-            }
-        }
-    }
+) -> Result<(GestureSet, Vec<String>, Vec<String>), ConfigError> {
+    let entries = &file.gesture;
+    let text = |entry: &GestureEntry| read(files, &entry.file, "gesture.file", at);
+    let texts = entries.iter().map(text).collect::<Result<Vec<_>, _>>()?;
+    let path = |entry: &GestureEntry| entry.file.get_ref().clone();
+    let paths: Vec<String> = entries.iter().map(path).collect();
+    let set = merged(files, &paths, &texts)
+        .map_err(|bad| at.at(entries[bad.index].file.span(), "gesture.file", bad.problem))?;
     let none = "no gesture file; give [[gesture]] file = \"gestures/hand.toml\"";
-    let (set, _) = merged.ok_or_else(|| at.key("gesture", none))?;
-    Ok(set)
+    Ok((set.ok_or_else(|| at.key("gesture", none))?, paths, texts))
 }

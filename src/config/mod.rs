@@ -7,9 +7,11 @@ pub mod build;
 pub mod error;
 pub mod file;
 pub mod files;
+mod gestures;
 mod motion;
 mod servos;
 
 pub use build::{Character, load};
 pub use error::ConfigError;
 pub use files::Files;
+pub use gestures::GestureFiles;

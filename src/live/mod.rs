@@ -11,6 +11,7 @@ pub mod feed;
 pub mod keys;
 pub mod realtime;
 pub mod record;
+pub mod reload;
 pub mod session;
 pub mod source;
 pub mod stats;

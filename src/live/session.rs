@@ -5,12 +5,13 @@ use super::control::{self, ControlOptions, Ending, Outcome, Parts};
 use super::feed::{ReaderFeed, read_ahead};
 use super::realtime::{self, RealTime};
 use super::record::{CycleRecord, Inline, record_queue};
+use super::reload::{self, News, Watcher};
 use super::stats::Stats;
 use super::stop::StopSwitch;
 use crate::base::{Clock, Time, VirtualClock};
 use crate::bus::{BusError, ServoBus, TorqueReport};
 use crate::config::file::{OnExit, OnLost, OnServoFault};
-use crate::config::{Character, ConfigError};
+use crate::config::{Character, ConfigError, GestureFiles};
 use crate::gesture::{FrontEnd, FrontEndError};
 use crate::motion::graph::TransitionCounts;
 use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader, PoseSample};
@@ -117,6 +118,10 @@ pub trait Observer {
     fn cycle(&mut self, record: &CycleRecord);
     /// Called some times a second in real time; never in virtual time.
     fn tick(&mut self);
+    /// Gesture files were changed while the session ran.
+    fn news(&mut self, news: &News) {
+        let _ = news;
+    }
 }
 
 /// A session ready to run.
@@ -131,6 +136,8 @@ pub struct Session<R> {
     pub first: PoseSample,
     /// How the reader is ended when it is live; its samples are then due on arrival.
     pub live: Option<Hangup>,
+    /// Gesture files that are loaded again when they change (real time only).
+    pub reload: Option<GestureFiles>,
     /// Signals and keys.
     pub stop: StopSwitch,
     /// Rate, duration, what happens at the end.
@@ -156,6 +163,7 @@ pub fn run_virtual<R: BufRead>(
             feed: &mut feed,
             clock,
             stop: &session.stop,
+            handover: None,
             recorder: &mut recorder,
             on_start: session.on_start.as_mut(),
         },
@@ -183,6 +191,15 @@ pub fn run_real<R: BufRead + Send + 'static>(
     observer: &mut dyn Observer,
     tick_hz: f64,
 ) -> Result<Report, SessionError> {
+    let (mut handover, watcher) = match session.reload {
+        Some(files) => {
+            let header = session.reader.header();
+            let (ours, loader) = reload::handover(header);
+            let watcher = Watcher::start(files, header.clone(), loader)?;
+            (Some(ours), Some(watcher))
+        }
+        None => (None, None),
+    };
     let (mut feed, reading) = read_ahead(session.reader, session.first, session.live.is_some())?;
     let (mut recorder, mut records) = record_queue(&session.puppet, RECORDS);
     let (mut puppet, mut bus, mut on_start) = (session.puppet, session.bus, session.on_start);
@@ -199,6 +216,7 @@ pub fn run_real<R: BufRead + Send + 'static>(
                     feed: &mut feed,
                     clock: clock.as_ref(),
                     stop: &stop,
+                    handover: handover.as_mut(),
                     recorder: &mut recorder,
                     on_start: on_start.as_mut(),
                 },
@@ -211,6 +229,9 @@ pub fn run_real<R: BufRead + Send + 'static>(
         while !control.is_finished() {
             std::thread::sleep(period);
             records.drain(|record| observer.cycle(record));
+            while let Some(news) = watcher.as_ref().and_then(Watcher::news) {
+                observer.news(&news);
+            }
             observer.tick();
         }
     }));

@@ -74,6 +74,15 @@ impl Player {
 
     /// One cycle with the samples due by now; samples that are not `heard` are lost. True while it goes on.
     pub fn step(&mut self, heard: bool) -> bool {
+        self.step_after(heard, |_, _| {})
+    }
+
+    /// The same; `before` is given the puppet and the samples first, as the control loop's parts are.
+    pub fn step_after(
+        &mut self,
+        heard: bool,
+        before: impl FnOnce(&mut Puppet, &[PoseSample]),
+    ) -> bool {
         let t_s = self.t_s();
         let from = self.next;
         while self.samples.get(self.next).is_some_and(|s| s.t <= t_s) {
@@ -84,6 +93,7 @@ impl Player {
         } else {
             &[]
         };
+        before(&mut self.puppet, samples);
         let inputs = Inputs {
             samples,
             states: &self.states,
