@@ -126,7 +126,7 @@ fn gestures_swapped_in_full_motion_make_no_jump_and_touch_no_memory() {
                 let front = FrontEnd::new(&set, &header, character.front_options).expect("fits");
                 let classes = character.classes.iter().map(|c| c.gesture).collect();
                 loader
-                    .offer(Gestures::new(front, classes))
+                    .offer(Box::new(Gestures::new(front, classes)))
                     .expect("nothing under way");
                 offered = true;
             }
@@ -207,7 +207,7 @@ fn an_offer_waits_for_the_one_before_and_other_classes_are_refused() {
     let (mut ours, mut loader) = handover(&header);
     let gestures = |classes: Vec<usize>| {
         let front = FrontEnd::new(&character.gestures, &header, character.front_options);
-        Gestures::new(front.expect("fits"), classes)
+        Box::new(Gestures::new(front.expect("fits"), classes))
     };
     loader.offer(gestures(vec![0])).expect("the first");
     assert!(

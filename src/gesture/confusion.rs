@@ -204,9 +204,11 @@ fn home_of(gesture: &Gesture) -> Vec<[f64; 3]> {
         GestureKind::NonCyclic => &gesture.frames[..gesture.frames.len().min(1)],
     };
     let mut home = vec![[0.0; 3]; frames.first().map_or(0, Vec::len)];
-    for place in frames.iter().flat_map(|f| f.iter().enumerate()) {
-        for axis in 0..3 {
-            home[place.0][axis] += place.1[axis] / frames.len() as f64;
+    for frame in frames {
+        for (home, place) in home.iter_mut().zip(frame) {
+            for (sum, value) in home.iter_mut().zip(place) {
+                *sum += value / frames.len() as f64;
+            }
         }
     }
     home

@@ -169,7 +169,7 @@ impl Loader {
     ///
     /// # Errors
     /// The gestures themselves, when others are still under way.
-    pub fn offer(&mut self, mut gestures: Gestures) -> Result<(), Gestures> {
+    pub fn offer(&mut self, mut gestures: Box<Gestures>) -> Result<(), Box<Gestures>> {
         if self.under_way {
             return Err(gestures);
         }
@@ -182,12 +182,12 @@ impl Loader {
             }
             after = self.past.back().map_or(after, |s| s.t);
         }
-        match self.fresh.push(Box::new(gestures)) {
+        match self.fresh.push(gestures) {
             Ok(()) => {
                 self.under_way = true;
                 Ok(())
             }
-            Err(rtrb::PushError::Full(gestures)) => Err(*gestures),
+            Err(rtrb::PushError::Full(gestures)) => Err(gestures),
         }
     }
 }
@@ -233,7 +233,7 @@ impl Watcher {
         let thread = std::thread::Builder::new()
             .name("gestures".into())
             .spawn(move || {
-                let mut waiting: Option<Gestures> = None;
+                let mut waiting: Option<Box<Gestures>> = None;
                 let mut until_look = Duration::ZERO;
                 while !ends.load(Ordering::Relaxed) {
                     if loader.listen() {
@@ -245,8 +245,9 @@ impl Watcher {
                         until_look = LOOK_EVERY;
                         match files.reload(&header) {
                             Ok(new) => {
-                                waiting =
-                                    new.map(|new| Gestures::new(new.front, new.gesture_of_class));
+                                waiting = new.map(|new| {
+                                    Box::new(Gestures::new(new.front, new.gesture_of_class))
+                                });
                             }
                             Err(why) => {
                                 let _ = tell.send(News::Kept(why));
