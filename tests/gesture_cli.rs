@@ -70,7 +70,7 @@ fn bad_input_ends_with_2_and_a_reason() {
         )
     };
     with(&["nowhere.jsonl", "nowhere.jsonl: cannot be read"]);
-    with(&["pose.bvh", ".jsonl or .csv"]);
+    with(&["pose.fbx", ".jsonl, .csv or .bvh"]);
     with(&[&waiting, "--estimator", "gobor", "did you mean gabor?"]);
     std::fs::write(path("other.csv"), "t,a.x,a.y,a.z\n0,0,0,0\n").expect("writable");
     with(&[&path("other.csv"), "no point palm"]);
@@ -90,7 +90,15 @@ fn bad_input_ends_with_2_and_a_reason() {
         "one sample only",
     );
     refused(
-        &["poses", "import", &waiting, "--out", &path("x.csv")],
+        &[
+            "poses",
+            "import",
+            &waiting,
+            "--kind",
+            "leap",
+            "--out",
+            &path("x.csv"),
+        ],
         "not a Leap Motion recording",
     );
 }

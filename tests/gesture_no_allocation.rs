@@ -4,7 +4,7 @@
 mod gesture_support;
 
 use gesture_support::{Path, header, pose, sample, times, wave_set};
-use handwave::gesture::{FrontEnd, FrontEndOptions};
+use handwave::gesture::{DerivedChannel, FrontEnd, FrontEndOptions};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -33,7 +33,17 @@ static COUNTING: Counting = Counting;
 #[test]
 fn push_estimate_and_predict_allocate_nothing() {
     let set = wave_set(Path::Line);
-    let mut front = FrontEnd::new(&set, &header(), FrontEndOptions::default()).expect("match");
+    let mood = DerivedChannel {
+        name: "mood".into(),
+        weights: vec![("height".into(), 0.5), ("yaw".into(), -1.0)],
+        offset: 0.1,
+        range: Some([-1.0, 1.0]),
+        smoothing_s: 2.0,
+    };
+    let mut front = FrontEnd::new(&set, &header(), FrontEndOptions::default())
+        .expect("match")
+        .with_channel(&mood)
+        .expect("a good mix");
     // 500 Hz overfills every window, so the wrap of the buffers is passed too.
     let samples: Vec<_> = times(500.0, 10.0, 0.3, 1)
         .into_iter()

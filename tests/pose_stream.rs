@@ -240,11 +240,12 @@ fn gaps_are_filled_in_a_straight_line() {
 proptest! {
     #[test]
     fn no_bytes_make_the_reader_panic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
-        for format in [PoseFormat::JsonLines, PoseFormat::Csv] {
-            let mut stream = match format {
-                PoseFormat::JsonLines => format!("{HEADER}\n").into_bytes(),
-                PoseFormat::Csv => b"t,a.x,a.y\n".to_vec(),
-            };
+        for (format, header) in [
+            (PoseFormat::JsonLines, format!("{HEADER}\n")),
+            (PoseFormat::Csv, "t,a.x,a.y\n".into()),
+            (PoseFormat::Bvh, "HIERARCHY\n".into()),
+        ] {
+            let mut stream = header.into_bytes();
             stream.extend(&bytes);
             if let Ok(reader) = PoseReader::new(&stream[..], format, "fuzz") {
                 reader.for_each(drop);

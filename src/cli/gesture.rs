@@ -53,7 +53,7 @@ amplitude is the progression, frequency 0. A sample that is dropped has no row."
         /// The gesture file.
         #[arg(long)]
         gestures: PathBuf,
-        /// The pose stream (.jsonl or .csv).
+        /// The pose stream (.jsonl, .csv or .bvh).
         #[arg(long)]
         poses: PathBuf,
         /// Where to write the estimates (CSV).

@@ -1,7 +1,9 @@
 //! `handwave poses`: bring recordings into the pose stream, look at them, compose performances.
 
+mod import;
+
 use super::{ExitStatus, Failure, say, warn};
-use crate::pose::{FaultCounts, PoseError, Recording, compose, leap};
+use crate::pose::{FaultCounts, PoseError, PoseReader, Recording, compose};
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,28 +17,16 @@ pub struct PosesArgs {
 
 #[derive(Subcommand, Debug)]
 enum PosesCommand {
-    /// Bring another program's recording into the pose stream.
-    #[command(after_help = "Examples:
-  handwave poses import waiting.json --out waiting.csv           a Leap Motion recording
-  handwave poses import waiting.json --joints --out hand.jsonl   with the knuckles
-
-Known: Leap Motion (LeapJS playback, decompressed JSON; millimetres and microseconds).")]
-    Import {
-        /// The recording.
-        file: PathBuf,
-        /// Where to write it: .jsonl or .csv, metres and seconds from 0.
-        #[arg(long)]
-        out: PathBuf,
-        /// With the joints of every finger (mcp, pip, dip), where the recording has them.
-        #[arg(long)]
-        joints: bool,
-    },
+    /// Bring another program's recording (BVH, Live Link Face, ...) into the pose stream.
+    #[command(after_help = import::EXAMPLES)]
+    Import(import::ImportArgs),
     /// What is in a pose stream: points, length, rate, gaps, dropped samples.
     #[command(after_help = "Examples:
   handwave poses info waiting.csv
-  handwave poses info waiting.csv --json")]
+  handwave poses info waiting.csv --json
+  handwave poses info walk.bvh")]
     Info {
-        /// The pose stream (.jsonl or .csv).
+        /// The pose stream (.jsonl, .csv or .bvh).
         file: PathBuf,
         /// One JSON object instead of text.
         #[arg(long)]
@@ -77,7 +67,7 @@ A recipe (TOML) names its sources and lists segments:
 /// Bad input, with exit code 2.
 pub fn run(args: PosesArgs) -> Result<ExitStatus, Failure> {
     match args.command {
-        PosesCommand::Import { file, out, joints } => import(&file, &out, joints),
+        PosesCommand::Import(args) => import::run(args),
         PosesCommand::Info { file, json } => info(&file, json),
         PosesCommand::Compose { recipe, out } => {
             write(&compose::compose(&recipe).map_err(Failure::input)?, &out)
@@ -85,15 +75,15 @@ pub fn run(args: PosesArgs) -> Result<ExitStatus, Failure> {
     }
 }
 
-fn import(file: &Path, out: &Path, joints: bool) -> Result<ExitStatus, Failure> {
-    write(&leap::import(file, joints).map_err(Failure::input)?, out)
-}
-
 fn write(recording: &Recording, out: &Path) -> Result<ExitStatus, Failure> {
     recording.write(out).map_err(Failure::input)?;
     let (from, to) = recording.span_s();
+    let channels = match recording.header.channels.len() {
+        0 => String::new(),
+        count => format!(", {count} channels"),
+    };
     say(format_args!(
-        "{}: {} samples, {} points, {:.3} s",
+        "{}: {} samples, {} points{channels}, {:.3} s",
         out.display(),
         recording.samples.len(),
         recording.header.points.len(),
@@ -104,8 +94,12 @@ fn write(recording: &Recording, out: &Path) -> Result<ExitStatus, Failure> {
 
 /// Reads a recording and says on standard error what was dropped.
 pub(super) fn read(path: &Path) -> Result<(Recording, FaultCounts), Failure> {
-    let (recording, dropped) =
-        Recording::read(path).map_err(|error: PoseError| Failure::input(error))?;
+    let failed = |error: PoseError| Failure::input(error);
+    let reader = PoseReader::open(path).map_err(failed)?;
+    if let Some(assumption) = reader.assumption() {
+        warn(format_args!("{assumption}"));
+    }
+    let (recording, dropped) = Recording::read_all(reader).map_err(failed)?;
     if dropped.total() > 0 {
         warn(format_args!(
             "{}: dropped samples: {dropped}",
@@ -160,10 +154,12 @@ fn info(file: &Path, json: bool) -> Result<ExitStatus, Failure> {
         step(1.0)
     ));
     say(format_args!("dropped: {dropped}"));
-    say(format_args!(
-        "{:<20} {:>6}  {:>26}  {:>20}",
-        "point", "seen", "mean x y z [mm]", "range x y z [mm]"
-    ));
+    if !points.is_empty() {
+        say(format_args!(
+            "{:<20} {:>6}  {:>26}  {:>20}",
+            "point", "seen", "mean x y z [mm]", "range x y z [mm]"
+        ));
+    }
     for point in &points {
         let [x, y, z] = point.mean.map(|v| 1e3 * v);
         let [dx, dy, dz] = point.range.map(|v| 1e3 * v);

@@ -157,6 +157,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         Err(SourceError::Interrupted) => return Ok(ExitStatus::Interrupted),
         opened => opened.map_err(Failure::input)?,
     };
+    if let Some(assumption) = source.reader.assumption() {
+        warn(format_args!("{assumption}"));
+    }
     let targets = options
         .targets
         .as_ref()

@@ -1,5 +1,6 @@
 //! From a configuration to checked parts: every file read, every name resolved, every number in range.
 
+use super::channel::{self, ChannelParts, channel_parts};
 use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
@@ -67,6 +68,7 @@ pub struct Character {
     pub view_hz: f64,
     graph: GraphParts,
     layers: Vec<LayerParts>,
+    channels: Vec<ChannelParts>,
 }
 
 /// Ramps and policies, checked.
@@ -127,6 +129,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         .iter()
         .map(|entry| layer_parts(&files, entry, &joints, &at))
         .collect::<Result<_, _>>()?;
+    let channels = channel_parts(&file, &at)?;
     let end_pose = match &file.safety.end_clip {
         Some(path) => {
             let clip = clip(&files, path, "safety.end_clip", &joints, &at)?;
@@ -205,6 +208,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         end_pose,
         graph,
         layers,
+        channels,
     };
     character
         .check_watchdog(character.rate_hz)
@@ -213,6 +217,11 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
 }
 
 impl Character {
+    /// Adds the derived channels to those of `front`.
+    pub fn with_channels(&self, front: FrontEnd) -> Result<FrontEnd, ConfigError> {
+        channel::bind(front, &self.channels, &self.config_name)
+    }
+
     /// The animator, with layers bound to the channels of `front`.
     pub fn animator(&self, front: &FrontEnd) -> Result<Animator, ConfigError> {
         let ranges = joint_ranges(&self.limits);

@@ -1,6 +1,7 @@
 //! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`.
 
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use toml::Spanned;
 
 /// A whole character.
@@ -15,6 +16,9 @@ pub struct CharacterFile {
     pub gesture: Vec<GestureEntry>,
     /// Motion classes, the nodes of the graph.
     pub class: Vec<ClassEntry>,
+    /// Channels mixed from those of the pose stream.
+    #[serde(default)]
+    pub channel: Vec<ChannelEntry>,
     /// Additive layers.
     #[serde(default)]
     pub layer: Vec<LayerEntry>,
@@ -82,6 +86,43 @@ pub struct ClipEntry {
     /// Gesture frequency at which it is played pure, Hz.
     #[serde(default)]
     pub frequency_hz: f64,
+}
+
+/// A channel mixed from those of the pose stream: `offset` plus every channel times its weight,
+/// limited to `range`, smoothed. A layer asks for it by its name like for any other.
+///
+/// ```toml
+/// [[channel]]
+/// name = "emotion"             # -1 sad to +1 happy, from the blendshapes of a face
+/// weights = { MouthSmileLeft = 0.5, MouthSmileRight = 0.5, MouthFrownLeft = -0.5, MouthFrownRight = -0.5 }
+/// offset = 0.0                 # value while all of them are 0
+/// range = [-1.0, 1.0]          # never beyond
+/// smoothing_s = 0.15           # standard deviation of the smoothing, 0 to 2 s
+///
+/// [[layer]]
+/// name = "mood"
+/// channel = "emotion"
+/// clip = "clips/crouch.json"
+/// range = [0.1, -0.8]          # the sadder, the lower
+/// one_sided = true
+/// ```
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelEntry {
+    /// Channel name; none of the stream's.
+    pub name: Spanned<String>,
+    /// Channels and their weights: the stream's, `yaw`, `height`, `distance`, `x`, `z` of the global
+    /// motion, and derived ones that stand before.
+    pub weights: BTreeMap<String, f64>,
+    /// Added to the mix.
+    #[serde(default)]
+    pub offset: f64,
+    /// Lowest and highest value; unlimited when not given.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
+    /// Standard deviation of the smoothing, seconds.
+    #[serde(default)]
+    pub smoothing_s: f64,
 }
 
 /// An additive layer.

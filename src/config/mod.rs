@@ -4,6 +4,7 @@
 //! embedded in the program), [`build`] checks it and makes the parts, [`error`] tells what is wrong.
 
 pub mod build;
+mod channel;
 pub mod error;
 pub mod file;
 pub mod files;

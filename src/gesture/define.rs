@@ -107,6 +107,11 @@ pub enum DefineError {
         /// The point.
         point: String,
     },
+    /// The recording has channels only.
+    #[error(
+        "the recording has no points, only channels; make points of those that the gesture moves: `handwave poses import RECORDING --as-points A,B,... --out POINTS.csv`"
+    )]
+    NoPoints,
     /// The set has a point that the recording does not have.
     #[error(
         "the recording has no point `{point}`, which the gesture file names; use recordings of one tracker, or start a new gesture file"

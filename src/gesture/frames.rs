@@ -9,6 +9,9 @@ const STRETCH_S: f64 = 20.0;
 
 /// Index in a stream with `header` of each point of the set.
 pub(super) fn columns_of(set: &GestureSet, header: &PoseHeader) -> Result<Vec<usize>, DefineError> {
+    if header.points.is_empty() {
+        return Err(DefineError::NoPoints);
+    }
     if header.dim != set.header.dim {
         return Err(DefineError::Dimension {
             found: header.dim,

@@ -1,9 +1,10 @@
 //! The front end: pose samples in, one estimate per gesture out, every sample, no allocation.
 
+use super::channel::{DerivedChannel, DerivedChannelError, Mixer};
 use super::wave::ProgressionSmoother;
 use super::{Estimator, EstimatorKind, GestureKind, GestureSet, Plane, References};
 use crate::base::angle::wrap_tau;
-use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault};
+use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault, channel_as_point};
 use std::f64::consts::TAU;
 
 /// A point of lower confidence counts as not seen.
@@ -91,7 +92,7 @@ enum Reading {
 /// server) and allocates nothing.
 pub struct FrontEnd {
     fit: GlobalFit,
-    /// Index in the stream of each point of the set.
+    /// Index in the stream of each point of the set; of a channel where the stream has no points.
     columns: Vec<usize>,
     stream_points: usize,
     planes: Vec<Plane>,
@@ -107,6 +108,7 @@ pub struct FrontEnd {
     motion: GlobalMotion,
     channel_names: Vec<String>,
     channels: Vec<f64>,
+    mixer: Mixer,
     last_t: Option<f64>,
 }
 
@@ -139,7 +141,13 @@ impl FrontEnd {
                 expected: set.header.dim,
             });
         }
-        let find = |name: &String| stream.points.iter().position(|point| point == name);
+        // A stream of channels alone (a face) is read as points that move with its channels.
+        let places = if stream.points.is_empty() {
+            &stream.channels
+        } else {
+            &stream.points
+        };
+        let find = |name: &String| places.iter().position(|place| place == name);
         let missing: Vec<String> = set
             .header
             .points
@@ -168,18 +176,21 @@ impl FrontEnd {
         references.fit.remove(&set.reference, None, &mut home);
         let mut channel_names: Vec<String> = GLOBAL_CHANNELS.map(String::from).to_vec();
         channel_names.extend(stream.channels.iter().cloned());
+        let planes: Vec<Plane> = (0..set.gestures.len())
+            .map(|index| Plane::train(set, &references, index))
+            .collect();
         Ok(Self {
             columns: set.header.points.iter().filter_map(find).collect(),
             stream_points: stream.points.len(),
-            planes: (0..set.gestures.len())
-                .map(|index| Plane::train(set, &references, index))
-                .collect(),
             fit: references.fit,
             readings: set
                 .gestures
                 .iter()
-                .map(|gesture| match gesture.kind {
-                    GestureKind::Cyclic => Reading::Wave(options.estimator.build(&settings)),
+                .zip(&planes)
+                .map(|(gesture, plane)| match gesture.kind {
+                    GestureKind::Cyclic => {
+                        Reading::Wave(options.estimator.build(&settings, plane.shape()))
+                    }
                     GestureKind::NonCyclic => Reading::Progression(ProgressionSmoother::new(
                         settings.progression_smoothing_s,
                     )),
@@ -190,6 +201,7 @@ impl FrontEnd {
                 .iter()
                 .map(|gesture| silent(gesture.kind))
                 .collect(),
+            planes,
             with_variance: settings.under_constrained,
             places: vec![[0.0; 3]; points],
             seen: vec![false; points],
@@ -199,8 +211,23 @@ impl FrontEnd {
             motion: GlobalMotion::default(),
             channels: vec![0.0; channel_names.len()],
             channel_names,
+            mixer: Mixer::default(),
             last_t: None,
         })
+    }
+
+    /// The same with one more channel, mixed from those that are there.
+    ///
+    /// # Errors
+    /// An unknown channel in the weights, a name that is taken, a value out of range.
+    pub fn with_channel(mut self, derived: &DerivedChannel) -> Result<Self, DerivedChannelError> {
+        let mut mixer = std::mem::take(&mut self.mixer);
+        let names: Vec<&str> = self.channel_aliases().collect();
+        mixer.add(derived, &names, |name| self.channel_index(name))?;
+        self.mixer = mixer;
+        self.channel_names.push(derived.name.clone());
+        self.channels.push(0.0);
+        Ok(self)
     }
 
     /// Takes the next sample. A sample that is refused changes nothing.
@@ -228,7 +255,12 @@ impl FrontEnd {
         let mut count = 0;
         for (index, column) in self.columns.iter().enumerate() {
             let confidence = sample.confidence.get(*column).copied().unwrap_or(1.0);
-            let place = sample.points[*column].filter(|_| confidence >= LEAST_CONFIDENCE);
+            let place = if self.stream_points > 0 {
+                sample.points[*column].filter(|_| confidence >= LEAST_CONFIDENCE)
+            } else {
+                let value = sample.channels.get(*column).copied().flatten();
+                value.map(|value| channel_as_point(index, self.columns.len(), value))
+            };
             if let Some(place) = place {
                 // Places beyond a thousand kilometres are no places; their squares overflow nothing.
                 if !place.iter().all(|value| value.abs() < 1e6) {
@@ -293,6 +325,7 @@ impl FrontEnd {
                 *channel = *value;
             }
         }
+        self.mixer.mix(sample.t, &mut self.channels);
         self.last_t = Some(sample.t);
         Ok(())
     }
@@ -373,6 +406,7 @@ impl FrontEnd {
         }
         self.local.copy_from_slice(&self.home);
         self.channels.fill(0.0);
+        self.mixer.reset();
         self.motion = GlobalMotion::default();
         self.last_t = None;
     }

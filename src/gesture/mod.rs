@@ -4,6 +4,7 @@
 //! what is left to one complex number (or a progression), and an [`Estimator`] reads amplitude,
 //! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
 
+mod channel;
 mod confusion;
 mod define;
 mod file;
@@ -20,6 +21,7 @@ mod teach_search;
 mod teach_words;
 mod wave;
 
+pub use channel::{DerivedChannel, DerivedChannelError, LONGEST_SMOOTHING_S};
 pub use confusion::{Confusion, Reading, STARTS, Verdict, confusion, confusion_of, sizes_m};
 pub use define::{
     CyclicMarks, DefineError, Definition, NonCyclicMarks, define_cyclic, define_non_cyclic,
@@ -34,4 +36,7 @@ pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
 pub use teach::Teacher;
 pub use teach_guidance::{Guidance, Novelty};
 pub use teach_words::{Mark, TeachError, TeachOptions, TeachPhase, TeachView};
-pub use wave::{Estimator, EstimatorKind, GaborEstimator, LONGEST_GAP_S, PlanePoint, WaveEstimate};
+pub use wave::{
+    CorrelationEstimator, DirectEstimator, Estimator, EstimatorKind, FastEstimator, GaborEstimator,
+    LONGEST_GAP_S, LeastSquaresEstimator, PlanePoint, Shape, WaveEstimate,
+};

@@ -16,6 +16,14 @@ pub struct PeriodEstimate {
 const PERIODS_S: (f64, f64) = (0.15, 5.5);
 /// A lag longer than this share of the stretch has too little overlap to be judged.
 const LONGEST_SHARE: f64 = 0.8;
+/// Of a part of the whole two periods must be seen.
+const TWICE: f64 = 0.5;
+/// A part must repeat at least this well: short movements look alike by chance.
+const SURE: f64 = 0.6;
+/// Stretches that repeat this nearly as well as the best are as good.
+const ABOUT: f64 = 0.03;
+/// Shortest stretch that is looked at by itself, seconds.
+const SHORTEST_STRETCH_S: f64 = 0.5;
 /// A multiple of the period repeats as well as the period itself: the shortest lag that comes this
 /// close to the highest peak is taken. A second harmonic's peak is lower than that.
 const AS_GOOD: f64 = 0.9;
@@ -25,7 +33,30 @@ const AS_GOOD: f64 = 0.9;
 /// `poses` holds one row per sample of uniform step `step_s`. The highest peak counts, not the
 /// first: real hands have strong second harmonics. Autocorrelation by FFT, normalised by the energy
 /// of the overlapping parts, so that its height does not fall with the lag.
+///
+/// Performers stop: what comes after the last period (an arm that goes down) outweighs it. So growing
+/// stretches from the first row on are looked at, and the longest that repeats about as well as the best
+/// one decides.
 pub fn find_period(poses: &[Vec<f64>], step_s: f64) -> Option<PeriodEstimate> {
+    let whole = period_of(poses, step_s, LONGEST_SHARE);
+    let mut stretches = Vec::new();
+    let mut length = (SHORTEST_STRETCH_S / step_s) as usize;
+    while length < poses.len() {
+        stretches.push(length);
+        length += (length / 4).max(1);
+    }
+    let parts: Vec<PeriodEstimate> = (stretches.into_iter())
+        .filter_map(|length| period_of(&poses[..length], step_s, TWICE))
+        .filter(|part| part.periodicity >= SURE)
+        .collect();
+    let best = (parts.iter().chain(&whole))
+        .map(|found| found.periodicity)
+        .fold(f64::NEG_INFINITY, f64::max);
+    (parts.into_iter().chain(whole)).rfind(|found| found.periodicity >= best - ABOUT)
+}
+
+/// The most prominent period of one stretch, at lags of up to `share` of it.
+fn period_of(poses: &[Vec<f64>], step_s: f64, share: f64) -> Option<PeriodEstimate> {
     let n = poses.len();
     let dim = poses.first().map_or(0, Vec::len);
     if n < 8 || dim == 0 || step_s <= 0.0 || !step_s.is_finite() {
@@ -69,7 +100,7 @@ pub fn find_period(poses: &[Vec<f64>], step_s: f64) -> Option<PeriodEstimate> {
     }
     let shortest = ((PERIODS_S.0 / step_s) as usize).max(2);
     let longest = ((PERIODS_S.1 / step_s) as usize)
-        .min((LONGEST_SHARE * n as f64) as usize)
+        .min((share * n as f64) as usize)
         .min(n - 2);
     let peaks: Vec<usize> = (shortest..=longest)
         .filter(|lag| {
@@ -112,6 +143,21 @@ mod tests {
         let found = find_period(&poses, step).expect("periodic");
         assert!((found.period_s - 1.08).abs() < 0.01, "{found:?}");
         assert!(found.periodicity > 0.98, "{found:?}");
+    }
+
+    #[test]
+    fn a_hand_that_goes_down_after_waving_does_not_hide_the_wave() {
+        let step = 1.0 / 30.0;
+        let poses: Vec<Vec<f64>> = (0..180)
+            .map(|k| {
+                let t = f64::from(k) * step;
+                let down = ((t - 3.5) / 1.0).clamp(0.0, 1.0);
+                let wave = if t < 3.5 { 0.1 } else { 0.0 };
+                vec![wave * (std::f64::consts::TAU * 1.25 * t).sin(), 1.5 - down]
+            })
+            .collect();
+        let found = find_period(&poses, step).expect("periodic at first");
+        assert!((found.period_s - 0.8).abs() < 0.02, "{found:?}");
     }
 
     #[test]

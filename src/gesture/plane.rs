@@ -1,6 +1,6 @@
 //! The linear map from a pose to a gesture's plane (Rhodin 2016, section 9.4.1, eq. 9.1 and 9.2).
 
-use super::{GestureKind, GestureSet, PlanePoint};
+use super::{GestureKind, GestureSet, PlanePoint, Shape};
 use crate::pose::GlobalFit;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -160,6 +160,7 @@ pub struct Plane {
     mean: DVector<f64>,
     /// Variance per component, averaged over the reference.
     usual_variance: [f64; 2],
+    shape: Shape,
 }
 
 impl Plane {
@@ -217,6 +218,7 @@ impl Plane {
             neighbours: Vec::new(),
             mean: mean.clone(),
             usual_variance: [1.0, 1.0],
+            shape: Shape::LOOP,
         };
         plane.calibrate(&references.local[index], &own);
         if gesture.kind == GestureKind::Cyclic {
@@ -228,6 +230,7 @@ impl Plane {
                 sum[1] += variance[1] / NEIGHBOUR_FRAMES as f64;
             }
             plane.usual_variance = sum;
+            plane.shape = plane.shape_of(&own);
         }
         plane
     }
@@ -258,6 +261,25 @@ impl Plane {
                 self.bias[component] /= explained;
             }
         }
+    }
+
+    /// First harmonic of the reference on this plane; `own` are the targets of its frames.
+    fn shape_of(&self, own: &[[f64; 2]]) -> Shape {
+        let origin = own.first().map_or(0.0, |first| first[1].atan2(first[0]));
+        let places = self.neighbours.iter().map(|(relative, _)| {
+            let mut z = self.bias;
+            for (axis, value) in relative.iter().enumerate() {
+                z[0] += self.rows[0][axis] * value;
+                z[1] += self.rows[1][axis] * value;
+            }
+            z
+        });
+        Shape::of_period(places, origin)
+    }
+
+    /// The figure that the gesture's reference draws on this plane; a circle for non-cyclic gestures.
+    pub fn shape(&self) -> Shape {
+        self.shape
     }
 
     fn linear(&self, pose: &[f64]) -> [f64; 2] {

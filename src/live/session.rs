@@ -69,6 +69,7 @@ pub fn puppet(
     rate_hz: f64,
 ) -> Result<Puppet, SessionError> {
     let front = FrontEnd::new(&character.gestures, header, character.front_options)?;
+    let front = character.with_channels(front)?;
     let mut animator = character.animator(&front)?;
     let end_pose = character.end_pose.clone().unwrap_or_else(|| {
         let mut rest = vec![0.0; character.joints.len()];

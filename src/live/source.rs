@@ -18,7 +18,7 @@ pub type SourceReader = PoseReader<Box<dyn BufRead + Send>>;
 pub enum SourceError {
     /// Not a source.
     #[error(
-        "unknown pose source {found:?}. Allowed: file:PATH with a .jsonl or .csv pose stream, udp://[ADDRESS:]PORT, - (standard input)"
+        "unknown pose source {found:?}. Allowed: file:PATH with a .jsonl, .csv or .bvh recording, udp://[ADDRESS:]PORT, - (standard input)"
     )]
     Unknown {
         /// As written.

@@ -335,6 +335,10 @@ pub fn compose(path: &Path) -> Result<Recording, PoseError> {
         let key = format!("sources.{name}");
         let (recording, _) = Recording::read(&folder.join(relative))?;
         let never = |point: String| wrong(&key, format!("point `{point}` is never seen in it"));
+        if recording.header.points.is_empty() {
+            let what = "channels only; a performance is composed of points (`handwave poses import --as-points` makes points of channels)";
+            return Err(wrong(&key, what.into()));
+        }
         if recording.samples.len() < 2 {
             return Err(wrong(&key, "one sample only; at least 2 are needed".into()));
         }

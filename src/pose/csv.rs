@@ -4,7 +4,8 @@
 //! t,wrist.x,wrist.y,wrist.z,thumb_tip.x,thumb_tip.y,thumb_tip.z,ch.emotion
 //! 0.0000,0.1,0.2,0.3,,,,0.4
 //! ```
-//! Two columns a point (`x`, `y`) make a 2-D stream. An empty cell: not seen.
+//! Two columns a point (`x`, `y`) make a 2-D stream. An empty cell: not seen. A stream may have
+//! channels alone: `t,ch.JawOpen`.
 
 use super::json::{HeaderFault, check_names, shown};
 use super::{PoseHeader, PoseSample, SampleFault};
@@ -73,7 +74,10 @@ pub fn parse_header(line: &str) -> Result<PoseHeader, HeaderFault> {
     }
     close(&mut header, axes)?;
     if header.points.is_empty() {
-        return Err(fault("no points".into()));
+        if header.channels.is_empty() {
+            return Err(fault("no points and no channels".into()));
+        }
+        header.dim = 3;
     }
     check_names(&header.points).map_err(fault)?;
     check_names(&header.channels).map_err(fault)?;

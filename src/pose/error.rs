@@ -2,6 +2,30 @@
 
 use super::{MAX_BAD_IN_A_ROW, SampleFault};
 
+/// A line of a recording that is not as it should be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: found {found}; allowed: {allowed}")]
+pub struct LineFault {
+    /// Line number from 1.
+    pub line: u64,
+    /// What stands there.
+    pub found: String,
+    /// What may stand there, and what to do.
+    pub allowed: String,
+}
+
+impl LineFault {
+    /// The error of the file it stands in.
+    pub fn in_file(self, file: &str) -> PoseError {
+        PoseError::BadLine {
+            file: file.into(),
+            line: self.line,
+            found: self.found,
+            allowed: self.allowed,
+        }
+    }
+}
+
 /// Why a pose stream cannot be read, written or composed.
 #[derive(Debug, thiserror::Error)]
 pub enum PoseError {
@@ -23,11 +47,29 @@ pub enum PoseError {
     },
     /// The name does not tell the format.
     #[error(
-        "{file}: a pose stream's name ends in .jsonl or .csv; other recordings come in with `handwave poses import`"
+        "{file}: a pose stream's name ends in .jsonl, .csv or .bvh; other recordings come in with `handwave poses import`"
     )]
     Format {
         /// The file as the user named it.
         file: String,
+    },
+    /// Poses are not written in this format.
+    #[error("{file}: poses are written to names that end in .jsonl or .csv")]
+    WriteFormat {
+        /// The file as the user named it.
+        file: String,
+    },
+    /// A line of a recording is not as it should be.
+    #[error("{file}:{line}: found {found}; allowed: {allowed}")]
+    BadLine {
+        /// The file as the user named it.
+        file: String,
+        /// Line number from 1.
+        line: u64,
+        /// What stands there.
+        found: String,
+        /// What may stand there, and what to do.
+        allowed: String,
     },
     /// The first line is no header of a pose stream.
     #[error("{file}:{line}: bad header: found {found}; allowed: {allowed}")]

@@ -6,7 +6,8 @@
 //! ```
 //! `unit` is `m` (default) or `mm`; lengths are metres after parsing. A `null` point was not seen.
 //! The header may list extra scalar channels as `"channels":["emotion"]`; names that only turn
-//! up in a sample's `ch` are added as they come.
+//! up in a sample's `ch` are added as they come. A stream may have channels alone (`"points":[]`,
+//! blendshapes of a face): its samples need no `p`.
 
 use super::{PoseHeader, PoseSample, SampleFault};
 use serde::Deserialize;
@@ -92,10 +93,13 @@ pub fn parse_header(line: &str) -> Result<JsonHeader, HeaderFault> {
         Ok(list)
     };
     let points = names("points")?;
-    if points.is_empty() {
-        return Err(fault("no points", "points: at least one name"));
-    }
     let mut channels = names("channels")?;
+    if points.is_empty() && channels.is_empty() {
+        return Err(fault(
+            "no points",
+            "points: at least one name, or none and the names of channels",
+        ));
+    }
     channels.truncate(MAX_CHANNELS);
     let dim = match value.get("dim").map_or(Some(3), serde_json::Value::as_u64) {
         Some(dim @ (2 | 3)) => dim as usize,
@@ -146,7 +150,7 @@ pub(super) fn check_names(names: &[String]) -> Result<(), String> {
 #[derive(Deserialize)]
 struct SampleLine {
     t: f64,
-    p: Vec<Option<Vec<Option<f64>>>>,
+    p: Option<Vec<Option<Vec<Option<f64>>>>>,
     c: Option<Vec<f64>>,
     ch: Option<BTreeMap<String, Option<f64>>>,
 }
@@ -173,15 +177,25 @@ pub fn parse_sample(
         }
     })?;
     let header = &mut stream.header;
-    if parsed.p.len() != header.points.len() {
+    let points = match parsed.p {
+        Some(points) => points,
+        // A stream of channels alone needs no points.
+        None if header.points.is_empty() => Vec::new(),
+        None => {
+            return Err(SampleFault::Malformed {
+                detail: "no `p`, the points".into(),
+            });
+        }
+    };
+    if points.len() != header.points.len() {
         return Err(SampleFault::PointCount {
-            found: parsed.p.len(),
+            found: points.len(),
             expected: header.points.len(),
         });
     }
     sample.t = parsed.t;
     sample.points.clear();
-    for (index, point) in parsed.p.iter().enumerate() {
+    for (index, point) in points.iter().enumerate() {
         let Some(coordinates) = point else {
             sample.points.push(None);
             continue;

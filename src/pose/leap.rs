@@ -3,9 +3,8 @@
 //! Axes: x right, y up from the device, z towards the user; right-handed like ours. The first
 //! hand of each frame is taken; a finger that a frame lacks was not seen.
 
-use super::{PoseError, PoseHeader, PoseSample, Recording};
+use super::{PoseHeader, PoseSample, Recording};
 use serde::Deserialize;
-use std::path::Path;
 
 const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "pinky"];
 const JOINTS: [&str; 3] = ["mcp", "pip", "dip"];
@@ -59,20 +58,7 @@ pub fn is_leap(text: &str) -> bool {
 /// later than the one before are dropped.
 ///
 /// # Errors
-/// Unreadable file, not a Leap Motion recording, no hand in it.
-pub fn import(path: &Path, joints: bool) -> Result<Recording, PoseError> {
-    let file = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|source| PoseError::Read {
-        file: file.clone(),
-        source,
-    })?;
-    parse(&text, joints).map_err(|what| PoseError::Import { file, what })
-}
-
-/// [`import`] on a text in memory; the error says what was found and what is allowed.
-///
-/// # Errors
-/// As [`import`].
+/// What was found and what is allowed: not a Leap Motion recording, no hand in it.
 pub fn parse(text: &str, joints: bool) -> Result<Recording, String> {
     let leap: LeapFile = serde_json::from_str(text).map_err(|error| {
         format!("not a Leap Motion recording ({error}); expected {{\"frames\":[{{\"timestamp\",\"hands\",\"pointables\"}}, ...]}}, decompressed")

@@ -1,5 +1,6 @@
 //! A pose stream read one sample at a time, from a file or anything that yields lines.
 
+use super::bvh::BvhStream;
 use super::json::{self, JsonHeader};
 use super::{FaultCounts, LONGEST_STEP_S, MAX_LINE_BYTES, PoseError, PoseHeader, PoseSample};
 use super::{SampleFault, Validator, csv};
@@ -14,17 +15,20 @@ pub enum PoseFormat {
     JsonLines,
     /// A table with a header row ([`csv`]).
     Csv,
+    /// BVH motion capture ([`super::bvh`]): joints are points. Read, not written.
+    Bvh,
 }
 
 impl PoseFormat {
     /// The format a file name ends in.
     ///
     /// # Errors
-    /// Neither `.jsonl` nor `.csv`.
+    /// Neither `.jsonl` nor `.csv` nor `.bvh`.
     pub fn of(path: &Path) -> Result<Self, PoseError> {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("jsonl") => Ok(Self::JsonLines),
             Some("csv") => Ok(Self::Csv),
+            Some("bvh") => Ok(Self::Bvh),
             _ => Err(PoseError::Format {
                 file: path.display().to_string(),
             }),
@@ -42,6 +46,8 @@ pub struct PoseReader<R> {
     file: String,
     format: PoseFormat,
     stream: JsonHeader,
+    /// What a BVH file holds; such a file is read as a whole.
+    bvh: Option<BvhStream>,
     validator: Validator,
     line: u64,
     bytes: Vec<u8>,
@@ -57,7 +63,7 @@ const PROVEN_BY: u64 = 50;
 const RESTART_S: f64 = 1.0;
 
 impl PoseReader<BufReader<File>> {
-    /// Opens a `.jsonl` or `.csv` file and reads its header.
+    /// Opens a `.jsonl`, `.csv` or `.bvh` file and reads its header.
     ///
     /// # Errors
     /// Unknown ending, unreadable file, bad header.
@@ -75,7 +81,7 @@ impl<R: BufRead> PoseReader<R> {
     /// Reads the header from `input`; `file` is the name used in messages.
     ///
     /// # Errors
-    /// Unreadable input, bad header.
+    /// Unreadable input, bad header; for BVH, any fault in the file.
     pub fn new(input: R, format: PoseFormat, file: &str) -> Result<Self, PoseError> {
         let mut reader = Self {
             input,
@@ -89,6 +95,7 @@ impl<R: BufRead> PoseReader<R> {
                 },
                 metres_per_unit: 1.0,
             },
+            bvh: None,
             validator: Validator::new(0),
             line: 0,
             bytes: Vec::new(),
@@ -96,6 +103,10 @@ impl<R: BufRead> PoseReader<R> {
             tolerant: false,
             restart_t: None,
         };
+        if format == PoseFormat::Bvh {
+            reader.read_bvh()?;
+            return Ok(reader);
+        }
         let header = |reader: &Self, fault: json::HeaderFault| PoseError::Header {
             file: reader.file.clone(),
             line: reader.line.max(1),
@@ -117,10 +128,12 @@ impl<R: BufRead> PoseReader<R> {
         };
         let parsed = match format {
             PoseFormat::JsonLines => json::parse_header(&line),
-            PoseFormat::Csv => csv::parse_header(&line).map(|header| JsonHeader {
-                header,
-                metres_per_unit: 1.0,
-            }),
+            PoseFormat::Csv | PoseFormat::Bvh => {
+                csv::parse_header(&line).map(|header| JsonHeader {
+                    header,
+                    metres_per_unit: 1.0,
+                })
+            }
         };
         reader.stream = parsed.map_err(|fault| header(&reader, fault))?;
         reader.validator = Validator::new(reader.stream.header.points.len());
@@ -136,9 +149,32 @@ impl<R: BufRead> PoseReader<R> {
         self
     }
 
+    fn read_bvh(&mut self) -> Result<(), PoseError> {
+        let read = BvhStream::read(&mut self.input).map_err(|source| PoseError::Read {
+            file: self.file.clone(),
+            source,
+        })?;
+        let stream = read.map_err(|fault| fault.in_file(&self.file))?;
+        self.stream.header = stream.header();
+        self.validator = Validator::new(self.stream.header.points.len());
+        self.bvh = Some(stream);
+        Ok(())
+    }
+
+    /// What had to be assumed about the input and may be wrong, for the user: a guessed unit.
+    pub fn assumption(&self) -> Option<String> {
+        let guess = self.bvh.as_ref()?.guess()?;
+        Some(format!("{}: {guess}", self.file))
+    }
+
     /// Names and dimension. Channels that only turn up in samples are appended while reading.
     pub fn header(&self) -> &PoseHeader {
         &self.stream.header
+    }
+
+    /// The input's name in messages.
+    pub fn file(&self) -> &str {
+        &self.file
     }
 
     /// Samples dropped so far, by reason.
@@ -157,10 +193,18 @@ impl<R: BufRead> PoseReader<R> {
     /// Unreadable input, ten bad samples in a row.
     pub fn read_into(&mut self, sample: &mut PoseSample) -> Result<bool, PoseError> {
         loop {
-            let Some(line) = self.next_line()? else {
-                return Ok(false);
+            let parsed = if let Some(bvh) = &mut self.bvh {
+                self.line = bvh.line();
+                if !bvh.read_into(sample) {
+                    return Ok(false);
+                }
+                Ok(true)
+            } else {
+                let Some(line) = self.next_line()? else {
+                    return Ok(false);
+                };
+                line.and_then(|line| self.parse(&line, sample))
             };
-            let parsed = line.and_then(|line| self.parse(&line, sample));
             let outcome = match parsed {
                 Ok(false) => continue,
                 Ok(true) => self.validator.check(sample).map(|()| sample.t),
@@ -215,7 +259,9 @@ impl<R: BufRead> PoseReader<R> {
     /// Parses a line; false where it is no sample and no fault (the header said again).
     fn parse(&mut self, line: &str, sample: &mut PoseSample) -> Result<bool, SampleFault> {
         match self.format {
-            PoseFormat::Csv => csv::parse_sample(line, &self.stream.header, sample)?,
+            PoseFormat::Csv | PoseFormat::Bvh => {
+                csv::parse_sample(line, &self.stream.header, sample)?;
+            }
             PoseFormat::JsonLines => {
                 if json::looks_like_header(line) {
                     // Senders repeat their header; another one would change the meaning of points.

@@ -2,7 +2,7 @@
 
 use super::{FaultCounts, PoseError, PoseFormat, PoseHeader, PoseReader, PoseSample, PoseWriter};
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufRead, BufWriter};
 use std::path::Path;
 
 /// Header and all good samples of a stream; times strictly increase.
@@ -15,12 +15,21 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads a `.jsonl` or `.csv` file to its end; also returns what was dropped.
+    /// Reads a `.jsonl`, `.csv` or `.bvh` file to its end; also returns what was dropped.
     ///
     /// # Errors
     /// Unreadable file, bad header, ten bad samples in a row, no sample at all.
     pub fn read(path: &Path) -> Result<(Self, FaultCounts), PoseError> {
-        let mut reader = PoseReader::open(path)?;
+        Self::read_all(PoseReader::open(path)?)
+    }
+
+    /// Reads what is left in `reader`; also returns what was dropped.
+    ///
+    /// # Errors
+    /// Unreadable input, ten bad samples in a row, no sample at all.
+    pub fn read_all<R: BufRead>(
+        mut reader: PoseReader<R>,
+    ) -> Result<(Self, FaultCounts), PoseError> {
         let mut samples = Vec::new();
         for sample in &mut reader {
             samples.push(sample?);
@@ -32,7 +41,7 @@ impl Recording {
         let counts = *reader.counts();
         if samples.is_empty() {
             return Err(PoseError::Empty {
-                file: path.display().to_string(),
+                file: reader.file().into(),
                 dropped: counts.to_string(),
             });
         }
@@ -42,13 +51,18 @@ impl Recording {
     /// Writes the recording to a `.jsonl` or `.csv` file, 0.1 mm resolution.
     ///
     /// # Errors
-    /// Unknown ending, unwritable file.
+    /// An ending that is neither, unwritable file.
     pub fn write(&self, path: &Path) -> Result<(), PoseError> {
         let failed = |source| PoseError::Write {
             file: path.display().to_string(),
             source,
         };
-        let format = PoseFormat::of(path)?;
+        let format = PoseFormat::of(path)
+            .ok()
+            .filter(|format| *format != PoseFormat::Bvh)
+            .ok_or_else(|| PoseError::WriteFormat {
+                file: path.display().to_string(),
+            })?;
         let out = BufWriter::new(File::create(path).map_err(failed)?);
         let mut writer = PoseWriter::new(out, &self.header, format, 4).map_err(failed)?;
         for sample in &self.samples {

@@ -17,7 +17,7 @@ impl<W: Write> PoseWriter<W> {
     /// Writes the header. `decimals` of a metre are kept: 4 is 0.1 mm.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Those of `out`; a format that is not written (BVH).
     pub fn new(
         mut out: W,
         header: &PoseHeader,
@@ -25,6 +25,12 @@ impl<W: Write> PoseWriter<W> {
         decimals: usize,
     ) -> io::Result<Self> {
         match format {
+            PoseFormat::Bvh => {
+                return Err(io::Error::new(
+                    io::ErrorKind::Unsupported,
+                    "points are no skeleton: poses are written as JSON Lines or CSV",
+                ));
+            }
             PoseFormat::JsonLines => {
                 let mut line = serde_json::json!({
                     "points": header.points, "dim": header.dim, "unit": "m",
@@ -67,7 +73,7 @@ impl<W: Write> PoseWriter<W> {
         text.clear();
         match self.format {
             PoseFormat::JsonLines => self.json_line(sample, &mut text),
-            PoseFormat::Csv => self.csv_line(sample, &mut text),
+            PoseFormat::Csv | PoseFormat::Bvh => self.csv_line(sample, &mut text),
         }
         text.push('\n');
         let outcome = self.out.write_all(text.as_bytes());

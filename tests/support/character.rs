@@ -15,10 +15,11 @@ pub fn built_in() -> Character {
 
 /// Header and samples of the bundled performance.
 pub fn performance(character: &Character) -> (PoseHeader, Vec<PoseSample>) {
-    let reader = source::open(&character.source, &character.files).expect("the performance");
-    let header = reader.header().clone();
-    let samples = reader.map(|sample| sample.expect("a good sample"));
-    (header, samples.collect())
+    let mut reader = source::open(&character.source, &character.files).expect("the performance");
+    let samples = (&mut reader).map(|sample| sample.expect("a good sample"));
+    let samples = samples.collect();
+    // Channels may turn up in the samples only.
+    (reader.header().clone(), samples)
 }
 
 /// A puppet and the performance it is given, as the control loop does it.

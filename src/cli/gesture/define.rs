@@ -34,7 +34,7 @@ impl From<Kind> for GestureKind {
 /// Marks in a recording, or a source and how it is marked.
 #[derive(Args, Debug)]
 pub(super) struct DefineArgs {
-    /// The recording (.jsonl or .csv) in which the gesture is marked.
+    /// The recording (.jsonl, .csv or .bvh) in which the gesture is marked.
     #[arg(long, required_unless_present = "input", conflicts_with = "input")]
     poses: Option<PathBuf>,
     /// Name of the gesture.

@@ -64,6 +64,9 @@ pub(super) fn run(args: &DefineArgs, input: &str) -> Result<ExitStatus, Failure>
         Err(SourceError::Interrupted) => return Ok(ExitStatus::Interrupted),
         first => first.map_err(Failure::input)?,
     };
+    if let Some(assumption) = opened.reader.assumption() {
+        warn(format_args!("{assumption}"));
+    }
     let header = opened.reader.header().clone();
     let set = args.set(&header)?;
     let mark_channel = args

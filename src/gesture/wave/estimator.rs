@@ -1,6 +1,9 @@
 //! What every wave estimator offers: points of a plane in, amplitude, frequency and phase out.
 
-use super::GaborEstimator;
+use super::{
+    CorrelationEstimator, DirectEstimator, FastEstimator, GaborEstimator, LeastSquaresEstimator,
+    Shape,
+};
 use crate::gesture::GestureOptions;
 
 /// After a gap in the samples longer than this, in seconds, an estimator begins anew.
@@ -49,26 +52,58 @@ pub trait Estimator: Send {
 #[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
 pub enum EstimatorKind {
     /// The thesis's bank of one-sided Gabor filters (Rhodin 2016, section 9.4.2).
-    #[default]
     Gabor,
+    /// Weighted least-squares wave fit in its place, smoothed alike.
+    LeastSquares,
+    /// Locked wave fit with change detection: quick after a change, steady otherwise. The default.
+    #[default]
+    Fast,
+    /// Baseline: modulus and argument of the present point.
+    Direct,
+    /// Baseline: auto- and cross-correlation (Shiratori and Hodgins 2008).
+    Correlation,
 }
 
 impl EstimatorKind {
+    /// All estimators, in the order in which comparisons list them.
+    pub const ALL: [Self; 5] = [
+        Self::Gabor,
+        Self::LeastSquares,
+        Self::Fast,
+        Self::Direct,
+        Self::Correlation,
+    ];
+
     /// Names that [`EstimatorKind::from_name`] knows.
-    pub const NAMES: [&'static str; 2] = ["default", "gabor"];
+    pub const NAMES: [&'static str; 6] = ["default", "gabor", "lsq", "fast", "direct", "xcorr"];
 
     /// The estimator of that name; `default` is the best one there is.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
-            "default" | "gabor" => Some(Self::Gabor),
-            _ => None,
+            "default" => Some(Self::default()),
+            _ => Self::ALL.into_iter().find(|kind| kind.name() == name),
         }
     }
 
-    /// A new estimator of this kind.
-    pub fn build(self, options: &GestureOptions) -> Box<dyn Estimator> {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gabor => "gabor",
+            Self::LeastSquares => "lsq",
+            Self::Fast => "fast",
+            Self::Direct => "direct",
+            Self::Correlation => "xcorr",
+        }
+    }
+
+    /// A new estimator of this kind for a gesture whose reference draws `shape` on its plane.
+    pub fn build(self, options: &GestureOptions, shape: Shape) -> Box<dyn Estimator> {
         match self {
             Self::Gabor => Box::new(GaborEstimator::new(options)),
+            Self::LeastSquares => Box::new(LeastSquaresEstimator::new(options, shape)),
+            Self::Fast => Box::new(FastEstimator::new(options, shape)),
+            Self::Direct => Box::new(DirectEstimator::new(options)),
+            Self::Correlation => Box::new(CorrelationEstimator::new(options, shape)),
         }
     }
 }

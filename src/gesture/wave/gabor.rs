@@ -22,9 +22,9 @@
 //! filter takes some 80 to 160 samples whatever the rate.
 
 use super::estimator::LONGEST_GAP_S;
+use super::history::{HISTORY_S, History};
 use super::kernel::Kernel;
 use super::smooth::Smoother;
-use super::window::Window;
 use super::{Estimator, PlanePoint, WaveEstimate};
 use crate::base::angle::wrap_tau;
 use crate::gesture::GestureOptions;
@@ -33,52 +33,8 @@ use crate::gesture::GestureOptions;
 const FILTERS: usize = 50;
 /// Shortest and longest period in seconds (5 and 150 frames at 30 Hz).
 const PERIODS_S: (f64, f64) = (1.0 / 6.0, 5.0);
-/// History in seconds.
-const HISTORY_S: f64 = 5.0;
-/// Samples of history: 5 s at up to 400 Hz; at higher rates the history shortens.
-const CAPACITY: usize = 2048;
-/// Levels of averaging: blocks of 1, 2, ... 64 samples.
-const LEVELS: usize = 7;
-/// A block spans at most this share of a period: its average errs by less than 0.11 %.
-const BLOCK_PERIODS: f64 = 1.0 / 40.0;
-/// Longest time one sample stands for.
-const LONGEST_STEP_S: f64 = 0.1;
 /// The other sense of rotation must be stronger by this factor.
 const SENSE_BIAS: f64 = 1.1;
-
-#[derive(Copy, Clone, Debug)]
-struct Sample {
-    t: f64,
-    point: PlanePoint,
-    modulus: f64,
-}
-
-/// Average of neighbouring samples.
-#[derive(Copy, Clone, Debug, Default)]
-struct Block {
-    lag_s: f64,
-    weight: f64,
-    z: [f64; 2],
-    modulus: f64,
-    variance: [f64; 2],
-}
-
-impl Block {
-    fn join(a: Block, b: Block) -> Block {
-        let weight = a.weight + b.weight;
-        let (u, v) = (a.weight / weight, b.weight / weight);
-        Block {
-            lag_s: u * a.lag_s + v * b.lag_s,
-            weight,
-            z: [u * a.z[0] + v * b.z[0], u * a.z[1] + v * b.z[1]],
-            modulus: u * a.modulus + v * b.modulus,
-            variance: [
-                u * a.variance[0] + v * b.variance[0],
-                u * a.variance[1] + v * b.variance[1],
-            ],
-        }
-    }
-}
 
 /// One filter's answer, in both senses of rotation.
 #[derive(Copy, Clone, Debug, Default)]
@@ -107,10 +63,7 @@ pub struct GaborEstimator {
     kernel: Kernel,
     frequencies_hz: [f64; FILTERS],
     under_constrained: bool,
-    history: Window<Sample>,
-    /// Time of the first sample since the last reset or long gap.
-    since: f64,
-    levels: Vec<Vec<Block>>,
+    history: History,
     smoother: Smoother,
     raw: WaveEstimate,
     sense: f64,
@@ -125,11 +78,7 @@ impl GaborEstimator {
             kernel: Kernel::new(options.lambda),
             frequencies_hz: std::array::from_fn(|i| 1.0 / (long * (-ratio * i as f64).exp())),
             under_constrained: options.under_constrained,
-            history: Window::new(CAPACITY),
-            since: 0.0,
-            levels: (0..LEVELS)
-                .map(|level| Vec::with_capacity((CAPACITY >> level) + 2))
-                .collect(),
+            history: History::new(),
             smoother: Smoother::new(options.smoothing_s, options.fusion_s),
             raw: WaveEstimate::default(),
             sense: 1.0,
@@ -141,58 +90,13 @@ impl GaborEstimator {
         self.raw
     }
 
-    /// Averages the history into levels, newest first.
-    fn build_levels(&mut self, now: f64) {
-        let samples = self.history.values();
-        let step = |later: usize, earlier: usize| {
-            (samples[later].t - samples[earlier].t).min(LONGEST_STEP_S)
-        };
-        let base = &mut self.levels[0];
-        base.clear();
-        for k in (0..samples.len()).rev() {
-            let after = if k + 1 < samples.len() {
-                step(k + 1, k)
-            } else {
-                0.0
-            };
-            let before = if k > 0 { step(k, k - 1) } else { 0.0 };
-            let sample = &samples[k];
-            base.push(Block {
-                lag_s: now - sample.t,
-                weight: (0.5 * (after + before)).max(1e-6),
-                z: sample.point.z,
-                modulus: sample.modulus,
-                variance: sample.point.variance,
-            });
-        }
-        for level in 1..LEVELS {
-            let (below, above) = self.levels.split_at_mut(level);
-            let (below, above) = (&below[level - 1], &mut above[0]);
-            above.clear();
-            for pair in below.chunks(2) {
-                above.push(match pair {
-                    [a, b] => Block::join(*a, *b),
-                    [a] => *a,
-                    _ => continue,
-                });
-            }
-        }
-    }
-
     /// Response of the filter of `frequency_hz` at `now`.
-    fn filter(&self, frequency_hz: f64, now: f64) -> Response {
-        let base = &self.levels[0];
-        let span = base.last().map_or(0.0, |oldest| oldest.lag_s);
-        let step = span / base.len().max(1) as f64;
-        let mut level = 0;
-        while level + 1 < LEVELS && step * (2 << level) as f64 * frequency_hz <= BLOCK_PERIODS {
-            level += 1;
-        }
+    fn filter(&self, frequency_hz: f64) -> Response {
         let reach = self.kernel.cut_cycles / frequency_hz;
         let (mut total, mut modulus) = (0.0, 0.0);
         let (mut rc, mut rs, mut ic, mut is) = (0.0, 0.0, 0.0, 0.0);
         let mut variance = [0.0; 2];
-        for block in &self.levels[level] {
+        for block in self.history.blocks(frequency_hz) {
             if block.lag_s > reach {
                 break;
             }
@@ -221,7 +125,7 @@ impl GaborEstimator {
         };
         // The share of the window that history can cover at all is full; less is a start.
         let possible = (HISTORY_S * frequency_hz).min(self.kernel.cut_cycles);
-        let covered = (now - self.since) * frequency_hz;
+        let covered = self.history.covered_s() * frequency_hz;
         let share = if covered >= possible {
             1.0
         } else {
@@ -238,10 +142,10 @@ impl GaborEstimator {
         }
     }
 
-    fn analyse(&self, now: f64) -> (WaveEstimate, f64) {
+    fn analyse(&self) -> (WaveEstimate, f64) {
         let mut moduli = [[0.0_f64; FILTERS]; 2];
         for (index, frequency) in self.frequencies_hz.iter().enumerate() {
-            let response = self.filter(*frequency, now);
+            let response = self.filter(*frequency);
             moduli[0][index] = length(response.forward);
             moduli[1][index] = length(response.backward);
         }
@@ -277,7 +181,7 @@ impl GaborEstimator {
                 frequency *= (self.frequencies_hz[1] / self.frequencies_hz[0]).powf(offset);
             }
         }
-        let response = self.filter(frequency, now);
+        let response = self.filter(frequency);
         let r = response.of(sense);
         let amplitude = length(r);
         let quality = if response.modulus > 1e-12 {
@@ -333,21 +237,12 @@ fn mean_modulus(wr: f64, wi: f64) -> f64 {
 
 impl Estimator for GaborEstimator {
     fn push(&mut self, t: f64, point: PlanePoint) {
-        match self.history.values().last() {
-            Some(last) if t - last.t <= LONGEST_GAP_S => {}
-            _ => {
-                self.reset();
-                self.since = t;
-            }
+        if self.history.push(t, point, LONGEST_GAP_S) {
+            self.smoother.reset();
+            self.raw = WaveEstimate::default();
+            self.sense = 1.0;
         }
-        self.history.push(Sample {
-            t,
-            point,
-            modulus: length(point.z),
-        });
-        self.history.forget(|old| t - old.t > HISTORY_S);
-        self.build_levels(t);
-        let (raw, sense) = self.analyse(t);
+        let (raw, sense) = self.analyse();
         self.raw = raw;
         self.sense = sense;
         self.smoother.push(t, raw);
