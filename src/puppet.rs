@@ -3,19 +3,22 @@
 //! No I/O, no lock, no clock, and after the first cycles no allocation. Live runs, replays, tests
 //! and benchmarks call this one function, so the same input gives the same bytes out.
 
+use crate::base::angle::{wrap_pi, wrap_tau};
 use crate::base::{JointState, Time};
 use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
-use crate::motion::Animator;
 use crate::motion::class::Drive;
-use crate::motion::ease;
+use crate::motion::{Animator, Follower, ease};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
+use std::f64::consts::TAU;
 
 /// What happens when poses have been missing for longer than `lost_s`.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 pub enum LostPolicy {
     /// Come to rest and wait for poses.
     Idle,
+    /// Hold the pose and wait for poses.
+    Hold,
     /// End the run: settle, lie down, torque off.
     Stop,
 }
@@ -33,7 +36,8 @@ pub struct PuppetOptions {
     pub actuation_delay_s: f64,
     /// Age of the last pose up to which gestures go on in phase, seconds.
     pub coast_s: f64,
-    /// Age of the last pose from which poses count as lost, seconds.
+    /// Age of the last pose from which poses count as lost, seconds; until then motion is eased to
+    /// a hold.
     pub lost_s: f64,
     /// What then happens.
     pub on_lost: LostPolicy,
@@ -96,6 +100,9 @@ pub struct Puppet {
     stage_since: Time,
     ramp: Ramp,
     playing_since: Option<Time>,
+    tempo: Tempo,
+    /// Per class.
+    joins: Vec<Join>,
     rejected: u64,
     estimates: Vec<GestureEstimate>,
     drives: Vec<Drive>,
@@ -136,8 +143,90 @@ struct Ramp {
     seconds: f64,
 }
 
+/// How fast the puppet's own time runs: 1 while poses come, 0 while a pose is held.
+///
+/// To hold is to let time stand still: phases, blends, layers and transitions all stop where they
+/// are and go on from there, and no joint's speed jumps.
+#[derive(Copy, Clone, Debug)]
+struct Tempo {
+    value: f64,
+    /// Time by which the gestures' phases have been held back while poses are missing, seconds.
+    held_s: f64,
+}
+
+/// Highest change of tempo per second, down and up: what it adds to a joint's acceleration is this
+/// times its speed.
+const TEMPO_CHANGE: [f64; 2] = [4.0, 2.0];
+
+impl Tempo {
+    /// Moves towards `goal` and returns the puppet's time that passes in `dt_s`.
+    fn step(&mut self, goal: f64, dt_s: f64) -> f64 {
+        let [down, up] = TEMPO_CHANGE.map(|change| change * dt_s);
+        self.value += (goal - self.value).clamp(-down, up);
+        dt_s * self.value
+    }
+}
+
+/// A gesture's wave as a class is given it: what jumps after a gap in the poses is drawn over.
+#[derive(Copy, Clone, Debug, Default)]
+struct Join {
+    /// Phase of the gesture in the last cycle, rad.
+    phase_rad: f64,
+    /// What the class is given beyond the gesture's phase, rad; on its way to zero.
+    offset: Follower,
+    /// Frequency that the class was given last, Hz.
+    frequency_hz: f64,
+    /// There was a gap, and the frequency has not come up with the gesture's since.
+    joining: bool,
+}
+
+/// Poses that have been missing for this long have left a gap, seconds: estimators may jump after it.
+const GAP_S: f64 = 0.08;
+/// A phase that is further than this from where it was going has jumped, rad.
+const PHASE_JUMP: f64 = 0.4;
+/// How quickly a jump of phase is made good, 1/s, and at most at this part of the tempo: less than the
+/// class is able to, so that joints have something left for all else that changed meanwhile.
+const PHASE_JOIN: (f64, f64) = (2.0, 0.25);
+/// How quickly frequency may change after a gap, Hz/s.
+const FREQUENCY_JOIN: f64 = 1.5;
+
+impl Join {
+    /// Frequency and phase for a class that does or does not move now.
+    fn step(&mut self, wave: &GestureEstimate, gap: bool, moving: bool, dt_s: f64) -> (f64, f64) {
+        let jump = wrap_pi(wave.phase_rad - self.phase_rad - TAU * wave.frequency_hz * dt_s);
+        self.phase_rad = wave.phase_rad;
+        if !moving {
+            *self = Self {
+                phase_rad: wave.phase_rad,
+                frequency_hz: wave.frequency_hz,
+                ..Self::default()
+            };
+            return (wave.frequency_hz, wave.phase_rad);
+        }
+        self.joining |= gap;
+        if jump.abs() > PHASE_JUMP {
+            self.offset.value = wrap_pi(self.offset.value - jump);
+        }
+        let left = wave.frequency_hz - self.frequency_hz;
+        let most = FREQUENCY_JOIN * dt_s;
+        // Silence has no frequency worth following.
+        if self.joining && wave.amplitude > 0.0 && left.abs() > most {
+            self.frequency_hz += left.clamp(-most, most);
+        } else if wave.amplitude > 0.0 || !self.joining {
+            self.frequency_hz = wave.frequency_hz;
+            self.joining = gap;
+        }
+        let (quickness, share) = PHASE_JOIN;
+        let fastest = share * TAU * self.frequency_hz.abs();
+        let offset = self.offset.step(0.0, quickness, fastest, dt_s);
+        (self.frequency_hz, wrap_tau(wave.phase_rad + offset))
+    }
+}
+
 /// Share of a joint's speed and acceleration that ramps use.
 const RAMP_SHARE: f64 = 0.5;
+/// A class of lower amplitude stands still for all one can see.
+const MOVING: f64 = 1e-3;
 /// Slower than this counts as still, rad/s.
 const STILL_RAD_S: f64 = 0.02;
 /// The end is not waited for longer than this after gestures were released, seconds.
@@ -158,6 +247,7 @@ impl Puppet {
         let estimates = front.estimates().to_vec();
         let channels = vec![f64::NAN; front.channel_names().len()];
         Self {
+            joins: vec![Join::default(); gesture_of_class.len()],
             drives: vec![Drive::default(); gesture_of_class.len()],
             estimates,
             channels,
@@ -175,6 +265,10 @@ impl Puppet {
                 seconds: 0.0,
             },
             playing_since: None,
+            tempo: Tempo {
+                value: 1.0,
+                held_s: 0.0,
+            },
             rejected: 0,
             pose: vec![0.0; joints],
             last_pose: vec![0.0; joints],
@@ -259,6 +353,10 @@ impl Puppet {
         std::mem::swap(&mut self.gesture_of_class, &mut other.gesture_of_class);
         std::mem::swap(&mut self.estimates, &mut other.estimates);
         std::mem::swap(&mut self.channels, &mut other.channels);
+        for join in &mut self.joins {
+            // As after a gap: what jumps is drawn over.
+            join.joining = true;
+        }
         true
     }
 
@@ -269,21 +367,36 @@ impl Puppet {
         let age = now.secs() - self.front.last_t().map_or(started, |t| t.max(started));
         self.targets.pose_age_s = self.front.last_t().map(|t| now.secs() - t);
         self.targets.poses_lost = share > 0.0 && age > self.options.lost_s;
-        // The ladder: in phase while coasting, then eased out until the poses count as lost.
+        // The ladder: on in phase, then eased to a hold, then what the policy says.
         let fading = (age - self.options.coast_s) / (self.options.lost_s - self.options.coast_s);
-        let share = share * (1.0 - ease(fading));
-        for (gesture, estimate) in self.estimates.iter_mut().enumerate() {
-            *estimate = self.front.predict(gesture, actuation);
+        let holds = share > 0.0 && (fading < 1.0 || self.options.on_lost == LostPolicy::Hold);
+        let share = if holds || fading < 1.0 { share } else { 0.0 };
+        let goal = if holds { 1.0 - ease(fading) } else { 1.0 };
+        let dt_s = self.tempo.step(goal, self.options.dt_s);
+        if fading <= 0.0 {
+            self.tempo.held_s = 0.0;
+        } else {
+            self.tempo.held_s += self.options.dt_s - dt_s;
         }
-        for (drive, gesture) in self.drives.iter_mut().zip(&self.gesture_of_class) {
+        self.front.set_active(self.animator.active());
+        for (gesture, estimate) in self.estimates.iter_mut().enumerate() {
+            *estimate = self.front.predict(gesture, actuation - self.tempo.held_s);
+        }
+        let played = self.animator.played();
+        for (class, (drive, gesture)) in (self.drives.iter_mut())
+            .zip(&self.gesture_of_class)
+            .enumerate()
+        {
             let estimate = &self.estimates[*gesture];
+            let moving = played[class].amplitude > MOVING;
+            let (frequency_hz, phase_rad) = match estimate.kind {
+                GestureKind::Cyclic => self.joins[class].step(estimate, age > GAP_S, moving, dt_s),
+                GestureKind::NonCyclic => (0.0, estimate.phase_rad),
+            };
             *drive = Drive {
                 amplitude: estimate.amplitude * share,
-                frequency_hz: match estimate.kind {
-                    GestureKind::Cyclic => estimate.frequency_hz,
-                    GestureKind::NonCyclic => 0.0,
-                },
-                phase_rad: estimate.phase_rad,
+                frequency_hz,
+                phase_rad,
             };
         }
         for (index, value) in self.channels.iter_mut().enumerate() {
@@ -293,12 +406,8 @@ impl Puppet {
                 f64::NAN
             };
         }
-        self.animator.step(
-            &self.drives,
-            &self.channels,
-            self.options.dt_s,
-            &mut self.pose,
-        );
+        self.animator
+            .step(&self.drives, &self.channels, dt_s, &mut self.pose);
         let fastest = self
             .pose
             .iter()
@@ -367,6 +476,11 @@ impl Puppet {
     /// Gestures as used in the last step, in file order.
     pub fn estimates(&self) -> &[GestureEstimate] {
         &self.estimates
+    }
+
+    /// The gesture front end.
+    pub fn front(&self) -> &FrontEnd {
+        &self.front
     }
 
     /// The animator.

@@ -120,10 +120,8 @@ fn hands_free_a_recording_teaches_both_kinds_with_the_same_bytes_every_time() {
     assert_eq!(teach().2, text, "another result the second time");
 }
 
-#[test]
-fn a_pedal_in_the_stream_marks_start_and_end() {
-    let folder = Folder::empty();
-    // Pressed for 50 ms at 0.5 s and again one period later.
+/// The drumming hand with a pedal that is pressed for 50 ms at each of `presses`.
+fn with_pedal(folder: &Folder, presses: &[f64]) -> String {
     let waiting = std::fs::read_to_string(performance("waiting.csv")).expect("bundled");
     let mut lines = waiting.lines();
     let mut text = format!("{},ch.pedal\n", lines.next().expect("a header"));
@@ -134,10 +132,16 @@ fn a_pedal_in_the_stream_marks_start_and_end() {
             .expect("a time")
             .parse()
             .expect("a number");
-        let pressed = [0.5, 1.585].iter().any(|at| (*at..at + 0.05).contains(&t));
+        let pressed = presses.iter().any(|at| (*at..at + 0.05).contains(&t));
         text += &format!("{line},{}\n", f64::from(u8::from(pressed)));
     }
-    let input = format!("file:{}", folder.write("pedal.csv", &text));
+    format!("file:{}", folder.write("pedal.csv", &text))
+}
+
+#[test]
+fn a_pedal_in_the_stream_marks_start_and_end() {
+    let folder = Folder::empty();
+    let input = with_pedal(&folder, &[0.5, 1.585]);
     let args = ["--speed", "max", "--mark-channel", "pedal"];
     define(&folder, &input, "drum", &args).expect(0);
     let set = GestureSet::load(&folder.path("taught.toml")).expect("a gesture file");
@@ -149,24 +153,41 @@ fn a_pedal_in_the_stream_marks_start_and_end() {
 #[test]
 fn a_gesture_that_reads_nothing_of_itself_is_not_written_without_force() {
     let folder = Folder::empty();
+    // Two exactly equal periods marked as one: no linear map makes one turn of them.
+    let mut text =
+        "t,hip.x,hip.y,hip.z,head.x,head.y,head.z,hand.x,hand.y,hand.z,ch.pedal\n".to_owned();
+    for k in 0..200 {
+        let t = f64::from(k) / 50.0;
+        let (sin, cos) = (std::f64::consts::TAU * t).sin_cos();
+        let (x, y) = (0.3 + 0.2 * cos, 1.2 + 0.2 * sin);
+        let pressed = [1.0, 3.0].iter().any(|at| (*at..at + 0.05).contains(&t));
+        let pedal = u8::from(pressed);
+        text += &format!("{t:.2},0,0.9,0,0,1.6,0.05,{x:.5},{y:.5},0.2,{pedal}\n");
+    }
+    let input = format!("file:{}", folder.write("twice.csv", &text));
+    let args = ["--speed", "max", "--mark-channel", "pedal"];
+    let ended = define(&folder, &input, "drum", &args);
+    println!("{}", ended.out);
+    refused(ended, 2, &["not written", "--force"]);
+    assert!(!folder.path("taught.toml").exists(), "written all the same");
+    let forced = [&args[..], &["--force"]].concat();
+    let ended = define(&folder, &input, "drum", &forced).expect(0);
+    assert!(ended.out.contains("cannot work"), "{}", ended.out);
+    assert!(folder.path("taught.toml").exists());
+}
+
+#[test]
+fn a_twin_is_written_with_a_warning_that_names_the_other() {
+    let folder = Folder::empty();
     let args = ["--speed", "max", "--start-after", "0.5"];
     define(&folder, &source("waiting.csv"), "drum", &args).expect(0);
-    // The same movement again and again: every copy leaves less for each.
-    let mut set = GestureSet::load(&folder.path("taught.toml")).expect("a gesture file");
-    for k in 0..5 {
-        let mut copy = set.gestures[0].clone();
-        copy.name = format!("copy{k}");
-        set.put(copy);
-    }
-    set.save(&folder.path("taught.toml")).expect("writable");
-    let before = folder.read("taught.toml");
-    let ended = define(&folder, &source("waiting.csv"), "once_more", &args);
-    println!("{}", ended.out);
-    assert_eq!(folder.read("taught.toml"), before, "written all the same");
-    refused(ended, 2, &["not written", "--force"]);
-    let forced = [&args[..], &["--force"]].concat();
-    let ended = define(&folder, &source("waiting.csv"), "forced", &forced).expect(0);
-    assert!(ended.out.contains("cannot work"), "{}", ended.out);
+    let twin = define(&folder, &source("waiting.csv"), "twin", &args).expect(0);
+    assert!(
+        twin.out.contains("`twin` and `drum` answer to each other")
+            && twin.out.contains("more than two edges apart"),
+        "{}",
+        twin.out
+    );
 }
 
 #[test]

@@ -4,7 +4,6 @@
 mod support;
 
 use handwave::base::{JointState, Time};
-use handwave::config::file::OnLost;
 use handwave::live::session;
 use handwave::pose::PoseSample;
 use handwave::puppet::{Inputs, Stage};
@@ -13,7 +12,6 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use support::character::{Player, RATE_HZ, built_in, performance};
 use support::limits::LimitWatch;
-use support::recipe;
 
 /// Counts the allocations of each thread.
 struct Counting;
@@ -215,101 +213,5 @@ fn a_hundred_thousand_cycles_of_mischief_stay_inside_the_limits() {
     println!(
         "{} cycles, {refused} of {taken} samples refused",
         EPISODES * CYCLES
-    );
-}
-
-/// A player under watch.
-struct Watched {
-    player: Player,
-    watch: LimitWatch,
-    held_back: u64,
-}
-
-impl Watched {
-    /// Plays on until `until_s`; returns the fastest joint speed, rad/s.
-    fn play(&mut self, until_s: f64, heard: bool) -> f64 {
-        let mut fastest = 0.0_f64;
-        while self.player.t_s() < until_s && self.player.step(heard) {
-            self.watch
-                .see(self.player.positions())
-                .unwrap_or_else(|e| panic!("{e}"));
-            self.held_back += u64::from(self.player.puppet.targets().held_back > 0);
-            fastest = fastest.max(self.watch.fastest_rad_s());
-        }
-        fastest
-    }
-}
-
-/// A puppet in the middle of the second drumming segment, and the time.
-fn drumming(on_lost: OnLost) -> (Watched, f64, f64) {
-    let mut character = built_in();
-    character.safety.on_lost = on_lost;
-    let begins_s = character.safety.ramp_s + 0.005;
-    let segment = recipe::drumming().swap_remove(1);
-    let lost_at_s = begins_s + segment.from_s + 3.0;
-    let mut watched = Watched {
-        player: Player::new(&character, begins_s),
-        watch: LimitWatch::new(&character.limits, 1.0 / RATE_HZ),
-        held_back: 0,
-    };
-    let fastest = watched.play(lost_at_s, true);
-    assert!(fastest > 0.5, "not walking: {fastest} rad/s");
-    (watched, lost_at_s, character.safety.lost_s)
-}
-
-#[test]
-fn lost_poses_bring_the_legs_to_rest_and_poses_that_return_resume() {
-    let (mut watched, lost_at_s, lost_s) = drumming(OnLost::Idle);
-    let coasting = watched.play(lost_at_s + 0.3, false);
-    assert!(coasting > 0.5, "stopped within 0.3 s: {coasting} rad/s");
-    watched.play(lost_at_s + lost_s - 0.01, false);
-    assert!(
-        !watched.player.puppet.targets().poses_lost,
-        "lost too early"
-    );
-    watched.play(lost_at_s + lost_s + 0.02, false);
-    assert!(
-        watched.player.puppet.targets().poses_lost,
-        "not lost after {lost_s} s"
-    );
-    watched.play(lost_at_s + lost_s + 0.6, false);
-    let resting = watched.play(lost_at_s + lost_s + 1.5, false);
-    assert!(resting < 0.02, "still moving at {resting} rad/s");
-    let resumed = watched.play(lost_at_s + lost_s + 3.5, true);
-    assert!(resumed > 0.5, "poses are back, legs at {resumed} rad/s");
-    assert!(!watched.player.puppet.targets().poses_lost);
-    assert_eq!(
-        watched.held_back,
-        0,
-        "cycles in which the envelope acted: {}",
-        watched.watch.extremes()
-    );
-    println!(
-        "envelope acted in {} cycles; coasting {coasting:.2}, resting {resting:.4}, resumed {resumed:.2} rad/s; {}",
-        watched.held_back,
-        watched.watch.extremes()
-    );
-}
-
-#[test]
-fn with_on_lost_stop_the_run_lies_down() {
-    let (mut watched, lost_at_s, lost_s) = drumming(OnLost::Stop);
-    watched.play(lost_at_s + lost_s + 0.1, false);
-    assert_eq!(watched.player.puppet.stage(), Stage::Settling);
-    watched.play(lost_at_s + lost_s + 8.0, false);
-    let took = watched.player.t_s() - lost_at_s;
-    assert_eq!(watched.player.puppet.stage(), Stage::Done, "after {took} s");
-    let lie = built_in().end_pose.expect("an end pose");
-    for (joint, (at, lie)) in watched.player.positions().iter().zip(&lie).enumerate() {
-        assert!(
-            (at - lie).abs() < 1e-6,
-            "joint {joint} at {at}, lying is {lie}"
-        );
-    }
-    let held_back = watched.held_back;
-    assert_eq!(held_back, 0, "cycles in which the envelope acted");
-    println!(
-        "envelope acted in {held_back} cycles; lying {took:.2} s after the last pose; {}",
-        watched.watch.extremes()
     );
 }

@@ -8,7 +8,7 @@ mod report;
 mod teach;
 
 use super::{ExitStatus, Failure};
-use crate::gesture::GestureSet;
+use crate::gesture::{GestureSet, PerformerScale};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -45,6 +45,7 @@ not written (exit 2) without --force. A recording's marks are taken as they are,
     /// Run an estimator over a recording: one row per gesture and sample.
     #[command(after_help = "Examples:
   handwave gesture estimate --gestures hand.toml --poses performance.jsonl --out waves.csv
+  handwave gesture estimate --gestures hand.toml --poses child.jsonl --scale 1.5 --out waves.csv
 
 Columns: t,gesture,amplitude,frequency_hz,phase_rad,quality. Amplitude 1 is as large as shown, not
 clamped; phase in [0, 2 pi); the frequency is negative in the opposite sense. Non-cyclic gestures:
@@ -62,6 +63,10 @@ amplitude is the progression, frequency 0. A sample that is dropped has no row."
         /// default, gabor.
         #[arg(long, default_value = "default")]
         estimator: String,
+        /// Size of the gestures' reference by the performer's, or rest: measured over the first
+        /// still second.
+        #[arg(long, value_name = "NUMBER|rest", default_value = "1")]
+        scale: PerformerScale,
     },
     /// The gestures of files and folders.
     #[command(after_help = "Examples:
@@ -143,7 +148,8 @@ pub fn run(args: GestureArgs) -> Result<ExitStatus, Failure> {
             poses,
             out,
             estimator,
-        } => estimate::estimate(&gestures, &poses, &out, &estimator),
+            scale,
+        } => estimate::estimate(&gestures, &poses, &out, &estimator, scale),
         GestureCommand::List {
             places,
             gestures,

@@ -7,6 +7,7 @@ use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
 use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files, GestureFiles};
+use crate::gesture::PerformerScale;
 use crate::live::control::Ending;
 use crate::live::reload::News;
 use crate::live::session::{self, Observer, Report, Session};
@@ -47,6 +48,7 @@ pub const EXAMPLES: &str = "Examples:
   handwave run my_robot.toml --input file:take3.jsonl
   handwave run my_robot.toml --input udp://7000       live: pose-stream JSON, one object a datagram, header first
   my_tracker | handwave run my_robot.toml --input -   live from a pipe (JSON Lines or CSV)
+  handwave run --scale 1.5                            a small hand (its poses enlarged to the gestures' size)
   handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
@@ -60,6 +62,10 @@ pub struct RunOptions {
     /// only without an address), - (standard input). A live one plays until Ctrl-C, --duration or its end
     #[arg(long, value_name = "SOURCE")]
     input: Option<String>,
+    /// Size of the gestures' reference by the performer's (1.4: a child), or rest: measured over
+    /// the first still second
+    #[arg(long, value_name = "NUMBER|rest")]
+    scale: Option<PerformerScale>,
     /// Bus in place of the configuration's: sim, dynamixel:PATH@BAUD
     #[arg(long, value_name = "BUS")]
     bus: Option<String>,
@@ -115,6 +121,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         character.bus = bus
             .parse()
             .map_err(|e| Failure::input(format!("--bus {bus}: {e}")))?;
+    }
+    if let Some(scale) = options.scale {
+        character.front_options.scale = scale;
     }
     let rate_hz = options.rate.unwrap_or(character.rate_hz);
     if !(10.0..=2000.0).contains(&rate_hz) {
@@ -240,7 +249,7 @@ fn reload(
     character: &Character,
     live: bool,
 ) -> Result<Option<GestureFiles>, Failure> {
-    let files = &character.gesture_files;
+    let files = character.gesture_files();
     if options.watch && !files.can_change() {
         return Err(Failure::input(
             "--watch: the gestures of the built-in quadruped are part of the program; copy configs/quadruped.toml and its parts, and run that",
@@ -252,7 +261,7 @@ fn reload(
         ));
     }
     let wanted = options.watch || character.reload.unwrap_or(live);
-    Ok((wanted && files.can_change()).then(|| files.clone()))
+    Ok((wanted && files.can_change()).then_some(files))
 }
 
 /// Opens the bus and puts the session together.

@@ -1,6 +1,7 @@
 //! The summary at the end of a run, for people and as JSON.
 
 use crate::config::Character;
+use crate::gesture::TrackingCounts;
 use crate::live::control::Ending;
 use crate::live::session::Report;
 use crate::live::stats::{FaultKind, Percentiles, ServoFault};
@@ -29,6 +30,8 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
         "envelope_cycles": stats.held_back,
         "transitions": report.transitions.completed, "transitions_aborted": report.transitions.aborted,
         "samples": stats.samples, "samples_dropped": dropped, "samples_refused": report.refused,
+        "points_rejected": report.tracking.outliers, "points_filled": report.tracking.filled,
+        "sides_swapped": report.tracking.swapped, "performer_scale": report.performer_scale,
         "poses_lost_cycles": stats.poses_lost,
         "bus_errors": stats.silent + stats.damaged, "replies_missing": stats.silent,
         "damage": stats.damaged, "bus_bytes": stats.bytes,
@@ -87,6 +90,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         line(stats.step.percentiles()),
         line(stats.lateness.percentiles()),
     );
+    text += &tracking_lines(report);
     text += &fault_lines(report, character);
     text += &torque_lines(report, character);
     if report.records_lost > 0 {
@@ -101,6 +105,26 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         .chain(report.real_time.iter().flat_map(|r| &r.notes))
     {
         text += &format!("note          {note}\n");
+    }
+    text
+}
+
+/// What was mended of the tracker's, when anything was, and the performer's scale, when it is not 1.
+fn tracking_lines(report: &Report) -> String {
+    let mended = &report.tracking;
+    let mut text = String::new();
+    if *mended != TrackingCounts::default() {
+        text += &format!(
+            "tracker       {} points rejected, {} filled in, left and right put back in {} samples\n",
+            mended.outliers, mended.filled, mended.swapped
+        );
+    }
+    match report.performer_scale {
+        Some(scale) if scale == 1.0 => {}
+        Some(scale) => text += &format!("performer     scale {scale:.3}\n"),
+        None => {
+            text += "performer     scale never measured: no still second with all points seen; declare it with --scale NUMBER\n";
+        }
     }
     text
 }

@@ -4,16 +4,17 @@ use super::channel::{self, ChannelParts, channel_parts};
 use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
-use super::gestures::{GestureFiles, merged};
+use super::gestures::{GestureFiles, Reader, merged};
 use super::motion::{
-    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts, read,
+    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts,
+    neighbourhoods, read,
 };
 use super::servos::servo_map;
 use crate::base::suggest::hint;
 use crate::body::JointSpace;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
-use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet};
+use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet, PerformerScale};
 use crate::motion::Animator;
 use crate::motion::class::MotionClass;
 use crate::motion::clip::ClipKind;
@@ -44,8 +45,6 @@ pub struct Character {
     pub gestures: GestureSet,
     /// How gestures are read.
     pub front_options: FrontEndOptions,
-    /// The files they came from.
-    pub gesture_files: GestureFiles,
     /// Whether changed gesture files are loaded while a run goes on; `None`: with live sources.
     pub reload: Option<bool>,
     /// Envelope limits in model order.
@@ -69,6 +68,8 @@ pub struct Character {
     graph: GraphParts,
     layers: Vec<LayerParts>,
     channels: Vec<ChannelParts>,
+    /// Paths of the gesture files, and what stood in them.
+    gesture_texts: (Vec<String>, Vec<String>),
 }
 
 /// Ramps and policies, checked.
@@ -169,19 +170,15 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let front_options = FrontEndOptions {
         estimator,
         lambda: file.input.window,
+        scale: performer_scale(&file, &at)?,
+        ..FrontEndOptions::default()
     };
     let character = Character {
         name: file.name.clone(),
         config_name: file_name.clone(),
         source: file.input.source.get_ref().clone(),
-        gesture_files: GestureFiles::new(
-            &files,
-            (paths, texts),
-            front_options,
-            &gestures,
-            &classes,
-        ),
         front_options,
+        gesture_texts: (paths, texts),
         reload: file.input.reload,
         safety: Safety {
             ramp_s: safety.ramp_s,
@@ -293,10 +290,46 @@ impl Character {
         Envelope::new(self.limits.clone(), dt_s)
     }
 
+    /// Per node of the motion graph the gestures that compete there, for
+    /// [`FrontEnd::with_neighbourhoods`].
+    pub fn neighbourhoods(&self) -> Vec<Vec<usize>> {
+        neighbourhoods(&self.graph.1, &self.classes, self.gestures.gestures.len())
+    }
+
+    /// The gesture files, to be read again when they change.
+    pub fn gesture_files(&self) -> GestureFiles {
+        GestureFiles::new(
+            &self.files,
+            self.gesture_texts.clone(),
+            &self.gestures,
+            Reader {
+                options: self.front_options,
+                edges: self.graph.1.clone(),
+                classes: self.classes.clone(),
+                channels: self.channels.clone(),
+                config_name: self.config_name.clone(),
+            },
+        )
+    }
+
     /// Names of the layers, in order.
     pub fn layer_names(&self) -> Vec<String> {
         self.layers.iter().map(|l| l.name.clone()).collect()
     }
+}
+
+/// The scale of `[input] scale`: a number, or `"rest"`.
+fn performer_scale(file: &CharacterFile, at: &Pointer<'_>) -> Result<PerformerScale, ConfigError> {
+    let Some(value) = &file.input.scale else {
+        return Ok(PerformerScale::default());
+    };
+    let written = match value.get_ref() {
+        toml::Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    written
+        .parse()
+        .map_err(|problem: String| at.at(value.span(), "input.scale", problem))
 }
 
 fn joint_ranges(limits: &[JointEnvelope]) -> Vec<JointRange> {

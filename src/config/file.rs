@@ -52,6 +52,9 @@ pub struct Input {
     /// Changed gesture files are loaded while a run goes on.
     #[serde(default)]
     pub reload: Option<bool>,
+    /// Size of the gestures' reference by the performer's: a number, or `"rest"`.
+    #[serde(default)]
+    pub scale: Option<Spanned<toml::Value>>,
 }
 
 /// A file of gestures.
@@ -240,7 +243,7 @@ pub struct SafetyEntry {
     /// Poses count as lost after this long, seconds.
     #[serde(default = "one")]
     pub lost_s: f64,
-    /// `idle` or `stop`.
+    /// `idle`, `hold` or `stop`.
     #[serde(default)]
     pub on_lost: OnLost,
     /// A servo latches a hardware error or comes back without torque: `stop` or `continue`.
@@ -258,6 +261,8 @@ pub enum OnLost {
     /// Come to rest and wait.
     #[default]
     Idle,
+    /// Hold the pose and wait.
+    Hold,
     /// Lie down, torque off, exit code 4.
     Stop,
 }

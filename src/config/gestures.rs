@@ -1,8 +1,9 @@
 //! The gesture files of a character: read, merged, checked against its classes, and read again when changed.
 
+use super::channel::{self, ChannelParts};
 use super::files::{FileStamp, Files};
-use super::motion::ClassParts;
-use crate::gesture::{FrontEnd, FrontEndOptions, GestureKind, GestureSet};
+use super::motion::{ClassParts, neighbourhoods};
+use crate::gesture::{FrontEnd, FrontEndOptions, GestureKind, GestureSet, PerformerScale};
 use crate::pose::PoseHeader;
 
 /// Gesture files and what the character needs of them.
@@ -16,11 +17,22 @@ pub struct GestureFiles {
     pending: Option<Result<Vec<String>, String>>,
     /// When each file was last changed, as of the last look.
     stamps: Vec<Option<FileStamp>>,
-    options: FrontEndOptions,
     /// Per class the gesture that drives it, by name, with its kind.
     wanted: Vec<(String, GestureKind)>,
+    reader: Reader,
     /// Gesture names, in the order in which they are shown.
     names: Vec<String>,
+}
+
+/// How a character reads its gestures.
+#[derive(Clone, Debug)]
+pub(super) struct Reader {
+    pub options: FrontEndOptions,
+    /// Edges of the motion graph.
+    pub edges: Vec<(usize, usize)>,
+    pub classes: Vec<ClassParts>,
+    pub channels: Vec<ChannelParts>,
+    pub config_name: String,
 }
 
 /// A front end of changed gesture files.
@@ -66,9 +78,8 @@ impl GestureFiles {
     pub(super) fn new(
         files: &Files,
         (paths, texts): (Vec<String>, Vec<String>),
-        options: FrontEndOptions,
         set: &GestureSet,
-        classes: &[ClassParts],
+        reader: Reader,
     ) -> Self {
         let driver = |class: &ClassParts| {
             let gesture = &set.gestures[class.gesture];
@@ -80,8 +91,8 @@ impl GestureFiles {
             pending: None,
             paths,
             texts: Ok(texts),
-            options,
-            wanted: classes.iter().map(driver).collect(),
+            wanted: reader.classes.iter().map(driver).collect(),
+            reader,
             names: set.gestures.iter().map(|g| g.name.clone()).collect(),
         }
     }
@@ -99,13 +110,18 @@ impl GestureFiles {
     /// Reads the files again; `None` when nothing in them has changed. A change counts once two looks in a row
     /// have seen the same: whoever writes a file is then done with it.
     ///
-    /// Gestures keep their order, new ones come last. Reads files and trains planes: not for the control
+    /// Gestures keep their order, new ones come last. `scale`: what was measured of the performer, who is still
+    /// the same. Reads files and trains planes: not for the control
     /// thread.
     ///
     /// # Errors
     /// A file that cannot be read or used, a gesture that a class needs and that is gone or of another kind:
     /// what was found and what to do, told once. What was loaded before stays.
-    pub fn reload(&mut self, stream: &PoseHeader) -> Result<Option<NewGestures>, String> {
+    pub fn reload(
+        &mut self,
+        stream: &PoseHeader,
+        scale: Option<f64>,
+    ) -> Result<Option<NewGestures>, String> {
         let stamps = self
             .paths
             .iter()
@@ -127,10 +143,15 @@ impl GestureFiles {
         }
         self.pending = None;
         self.texts.clone_from(&texts);
-        self.build(&texts?, stream).map(Some)
+        self.build(&texts?, stream, scale).map(Some)
     }
 
-    fn build(&mut self, texts: &[String], stream: &PoseHeader) -> Result<NewGestures, String> {
+    fn build(
+        &mut self,
+        texts: &[String],
+        stream: &PoseHeader,
+        scale: Option<f64>,
+    ) -> Result<NewGestures, String> {
         let set = merged(&self.files, &self.paths, texts).map_err(|bad| bad.problem)?;
         let mut set = set.ok_or("no gesture file")?;
         let place = |name: &String| self.names.iter().position(|n| n == name);
@@ -152,7 +173,19 @@ impl GestureFiles {
                 Ok(index)
             })
             .collect::<Result<Vec<_>, String>>()?;
-        let front = FrontEnd::new(&set, stream, self.options).map_err(|e| e.to_string())?;
+        let reader = &mut self.reader;
+        let mut options = reader.options;
+        if let Some(scale) = scale {
+            options.scale = PerformerScale::Declared(scale);
+        }
+        for (class, gesture) in reader.classes.iter_mut().zip(&gesture_of_class) {
+            class.gesture = *gesture;
+        }
+        let near = neighbourhoods(&reader.edges, &reader.classes, set.gestures.len());
+        let front = FrontEnd::with_neighbourhoods(&set, stream, options, &near)
+            .map_err(|e| e.to_string())?;
+        let front = channel::bind(front, &reader.channels, &reader.config_name)
+            .map_err(|e| e.to_string())?;
         self.names = set.gestures.iter().map(|g| g.name.clone()).collect();
         Ok(NewGestures {
             front,

@@ -231,6 +231,40 @@ pub(super) fn graph_parts(
     Ok((start, edges, options))
 }
 
+/// Edges that a neighbourhood reaches over (Rhodin 2016, section 9.4.1).
+const NEIGHBOURHOOD_EDGES: usize = 2;
+
+/// Per node the gestures of all nodes within two edges, and those that drive no class: they were
+/// defined to be told apart from.
+///
+/// Edges count in both directions: the gesture that led here may still be under way.
+pub(super) fn neighbourhoods(
+    edges: &[(usize, usize)],
+    classes: &[ClassParts],
+    gestures: usize,
+) -> Vec<Vec<usize>> {
+    let drives_none = |gesture: &usize| classes.iter().all(|class| class.gesture != *gesture);
+    let everywhere: Vec<usize> = (0..gestures).filter(drives_none).collect();
+    let around = |node: usize| {
+        let mut near = vec![false; classes.len()];
+        near[node] = true;
+        for _ in 0..NEIGHBOURHOOD_EDGES {
+            let reached = near.clone();
+            for (from, to) in edges {
+                near[*to] |= reached[*from];
+                near[*from] |= reached[*to];
+            }
+        }
+        let nodes = (0..classes.len()).filter(|other| near[*other]);
+        let mut list = everywhere.clone();
+        list.extend(nodes.map(|other| classes[other].gesture));
+        list.sort_unstable();
+        list.dedup();
+        list
+    };
+    (0..classes.len()).map(around).collect()
+}
+
 /// A layer, not yet bound to its channel.
 pub(super) fn layer_parts(
     files: &Files,

@@ -17,6 +17,8 @@ pub const SIZES: [f64; 2] = [0.5, 1.0];
 pub const STARTS: f64 = 0.2;
 /// A gesture that reads less than this of itself is weak.
 const WEAK: f64 = 0.6;
+/// One that reads more than this of itself was not shown steadily.
+const UNEVEN: f64 = 1.15;
 /// Samples per second of the performance.
 const RATE_HZ: f64 = 60.0;
 /// Periods that pass before a reading counts, and periods of reading.
@@ -299,6 +301,10 @@ impl Confusion {
         } else if own < WEAK {
             words.push(format!(
                 "`{name}` is weak: performed as it was shown it reads {own:.2} instead of 1: {cause}"
+            ));
+        } else if own > UNEVEN {
+            words.push(format!(
+                "`{name}` reads {own:.2} of itself instead of 1: the example is uneven; show it again, steadily"
             ));
         } else if least_own < WEAK {
             words.push(format!(

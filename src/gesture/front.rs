@@ -1,10 +1,17 @@
 //! The front end: pose samples in, one estimate per gesture out, every sample, no allocation.
 
+mod options;
+mod readers;
+
+pub use options::{FrontEndError, FrontEndOptions};
+pub use readers::GestureEstimate;
+
 use super::channel::{DerivedChannel, DerivedChannelError, Mixer};
-use super::wave::ProgressionSmoother;
-use super::{Estimator, EstimatorKind, GestureKind, GestureSet, Plane, References};
-use crate::base::angle::wrap_tau;
+use super::tracker::{Completion, OutlierFilter, RestMeasure, SideSwaps};
+use super::{GestureKind, GestureSet, PerformerScale, References, TrackingCounts};
+use crate::base::angle::{wrap_pi, wrap_tau};
 use crate::pose::{GlobalFit, GlobalMotion, PoseHeader, PoseSample, SampleFault, channel_as_point};
+use readers::Readers;
 use std::f64::consts::TAU;
 
 /// A point of lower confidence counts as not seen.
@@ -13,96 +20,32 @@ const LEAST_CONFIDENCE: f64 = 0.1;
 /// Channels of the global motion, before the stream's own.
 const GLOBAL_CHANNELS: [&str; 5] = ["yaw_rad", "height_m", "distance_m", "x_m", "z_m"];
 
-/// What may differ between uses of the same gesture file.
-#[derive(Copy, Clone, Debug, Default, PartialEq)]
-pub struct FrontEndOptions {
-    /// Which estimator reads the waves.
-    pub estimator: EstimatorKind,
-    /// Window in periods instead of the file's; 0.5 for a robot.
-    pub lambda: Option<f64>,
-}
-
-/// Why gestures and stream do not fit together.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FrontEndError {
-    /// The set has no gesture.
-    #[error("the gesture file has no gesture; add one with `handwave gesture define`")]
-    NoGestures,
-    /// The stream lacks points of the set.
-    #[error("the pose stream has no point {}; the gestures were defined with {}; use the same tracker, or define the gestures again", missing.join(", "), needed.join(", "))]
-    MissingPoints {
-        /// Points the stream lacks.
-        missing: Vec<String>,
-        /// All points of the set.
-        needed: Vec<String>,
-    },
-    /// Dimension 2 against 3.
-    #[error(
-        "the pose stream is {found}-dimensional, the gestures are {expected}-dimensional; define them again with this tracker"
-    )]
-    Dimension {
-        /// Of the stream.
-        found: usize,
-        /// Of the set.
-        expected: usize,
-    },
-    /// The anchor is none of the set's points.
-    #[error("global.anchor `{anchor}` is none of the gesture file's points")]
-    Anchor {
-        /// The anchor's name.
-        anchor: String,
-    },
-    /// An option out of range.
-    #[error("option {key}: found {found}; allowed: {allowed}")]
-    Option {
-        /// The key.
-        key: &'static str,
-        /// Its value.
-        found: f64,
-        /// Values allowed.
-        allowed: &'static str,
-    },
-}
-
-/// Amplitude, frequency and phase of one gesture.
-#[derive(Copy, Clone, Debug, PartialEq)]
-pub struct GestureEstimate {
-    /// Cyclic: 0 = not performed, 1 = as large as shown. Non-cyclic: progression, 0 at rest, 1 at
-    /// the extreme. Not clamped.
-    pub amplitude: f64,
-    /// Cycles per second, negative in the opposite sense; 0 for non-cyclic gestures.
-    pub frequency_hz: f64,
-    /// [0, 2 pi); for non-cyclic gestures 2 pi times the progression, wrapped.
-    pub phase_rad: f64,
-    /// Cyclic: how much of the motion is that wave; non-cyclic: share of points seen. 0..1.
-    pub quality: f64,
-    /// Whether the gesture repeats.
-    pub kind: GestureKind,
-}
-
-/// How one gesture is read.
-enum Reading {
-    Wave(Box<dyn Estimator>),
-    Progression(ProgressionSmoother),
-}
-
 /// From pose samples to gesture estimates.
 ///
 /// [`FrontEnd::push`] takes about 50 microseconds per cyclic gesture (108 Hz, one core of a cloud
 /// server) and allocates nothing.
 pub struct FrontEnd {
     fit: GlobalFit,
+    /// The same for poses that are complete and of the gestures' size.
+    fit_whole: GlobalFit,
     /// Index in the stream of each point of the set; of a channel where the stream has no points.
     columns: Vec<usize>,
     stream_points: usize,
-    planes: Vec<Plane>,
-    readings: Vec<Reading>,
-    estimates: Vec<GestureEstimate>,
-    with_variance: bool,
+    readers: Readers,
+    trust_tracker: bool,
+    swaps: SideSwaps,
+    outliers: OutlierFilter,
+    completion: Completion,
+    filled: u64,
+    rest: RestMeasure,
+    /// The performer's scale; `None` while it is still to be measured.
+    scale: Option<f64>,
     places: Vec<[f64; 3]>,
     seen: Vec<bool>,
+    /// Per point how far it is trusted: its confidence, 0 where it was not seen.
+    weights: Vec<f64>,
     fresh: Vec<[f64; 3]>,
-    /// Last known local place of every point; those of the reference at first.
+    /// Local place of every point as it was read last; those of the reference at first.
     local: Vec<[f64; 3]>,
     home: Vec<[f64; 3]>,
     motion: GlobalMotion,
@@ -115,7 +58,7 @@ pub struct FrontEnd {
 impl std::fmt::Debug for FrontEnd {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("FrontEnd")
-            .field("estimates", &self.estimates)
+            .field("estimates", &self.estimates())
             .field("motion", &self.motion)
             .field("last_t", &self.last_t)
             .finish_non_exhaustive()
@@ -132,6 +75,25 @@ impl FrontEnd {
         stream: &PoseHeader,
         options: FrontEndOptions,
     ) -> Result<Self, FrontEndError> {
+        let all = (0..set.gestures.len()).collect();
+        Self::with_neighbourhoods(set, stream, options, &[all])
+    }
+
+    /// The same for a motion graph: `neighbourhoods` lists for every node the gestures (indices in
+    /// `set`) that can be performed there, and only these are told apart while
+    /// [`FrontEnd::set_active`] says so. Node 0 is active at first. Without a node all compete.
+    ///
+    /// # Errors
+    /// As [`FrontEnd::new`].
+    pub fn with_neighbourhoods(
+        set: &GestureSet,
+        stream: &PoseHeader,
+        options: FrontEndOptions,
+        neighbourhoods: &[Vec<usize>],
+    ) -> Result<Self, FrontEndError> {
+        if neighbourhoods.is_empty() {
+            return Self::new(set, stream, options);
+        }
         if set.gestures.is_empty() {
             return Err(FrontEndError::NoGestures);
         }
@@ -170,41 +132,48 @@ impl FrontEnd {
                 found,
                 allowed,
             })?;
+        let scale = match options.scale {
+            PerformerScale::Declared(scale) if !options.scale.is_allowed() => {
+                return Err(FrontEndError::Option {
+                    key: "scale",
+                    found: scale,
+                    allowed: PerformerScale::ALLOWED,
+                });
+            }
+            PerformerScale::Declared(scale) => Some(scale),
+            PerformerScale::Rest => None,
+        };
         let references = References::new(set).map_err(|anchor| FrontEndError::Anchor { anchor })?;
         let points = set.header.points.len();
         let mut home = vec![[0.0; 3]; points];
         references.fit.remove(&set.reference, None, &mut home);
         let mut channel_names: Vec<String> = GLOBAL_CHANNELS.map(String::from).to_vec();
         channel_names.extend(stream.channels.iter().cloned());
-        let planes: Vec<Plane> = (0..set.gestures.len())
-            .map(|index| Plane::train(set, &references, index))
-            .collect();
+        let estimator = options.estimator;
+        let readers = Readers::new(set, &references, estimator, &settings, neighbourhoods);
+        // Jumps are judged in the tracker's own metres.
+        let reach_m = references.reach_m / scale.unwrap_or(1.0);
+        let completion = Completion::new(&references);
+        let rest = RestMeasure::new(&home, &references);
+        let fit_whole = references.fit;
+        let mut fit = fit_whole.clone();
+        fit.set_scale(scale.unwrap_or(1.0));
         Ok(Self {
             columns: set.header.points.iter().filter_map(find).collect(),
             stream_points: stream.points.len(),
-            fit: references.fit,
-            readings: set
-                .gestures
-                .iter()
-                .zip(&planes)
-                .map(|(gesture, plane)| match gesture.kind {
-                    GestureKind::Cyclic => {
-                        Reading::Wave(options.estimator.build(&settings, plane.shape()))
-                    }
-                    GestureKind::NonCyclic => Reading::Progression(ProgressionSmoother::new(
-                        settings.progression_smoothing_s,
-                    )),
-                })
-                .collect(),
-            estimates: set
-                .gestures
-                .iter()
-                .map(|gesture| silent(gesture.kind))
-                .collect(),
-            planes,
-            with_variance: settings.under_constrained,
+            fit,
+            fit_whole,
+            readers,
+            trust_tracker: options.trust_tracker,
+            swaps: SideSwaps::new(&set.header.points),
+            outliers: OutlierFilter::new(points, reach_m),
+            completion,
+            filled: 0,
+            rest,
+            scale,
             places: vec![[0.0; 3]; points],
             seen: vec![false; points],
+            weights: vec![0.0; points],
             fresh: vec![[0.0; 3]; points],
             local: home.clone(),
             home,
@@ -230,14 +199,17 @@ impl FrontEnd {
         Ok(self)
     }
 
-    /// Takes the next sample. A sample that is refused changes nothing.
+    /// Takes the next sample. A sample that is refused changes no estimate.
     ///
-    /// Points that were not seen (or with a confidence below 0.1) stay where they last were
-    /// relative to the body.
+    /// - Left and right exchanged by the tracker are put back; a point that jumps for a sample or
+    ///   two counts as not seen (unless [`FrontEndOptions::trust_tracker`]).
+    /// - Points that were not seen, or with a confidence below 0.1, are put where the others say
+    ///   they should be, from how all move together in the gestures. A confidence between 0.1 and 1
+    ///   is how far a point is believed against that.
     ///
     /// # Errors
     /// Another number of points than the stream's header, a number that is not finite, a time that
-    /// is not later than the last, less than half of the points seen.
+    /// is not later than the last, less than half of the points seen (or left after the filter).
     pub fn push(&mut self, sample: &PoseSample) -> Result<(), SampleFault> {
         if sample.points.len() != self.stream_points {
             return Err(SampleFault::PointCount {
@@ -270,47 +242,61 @@ impl FrontEnd {
                 count += 1;
             }
             self.seen[index] = place.is_some();
+            self.weights[index] = if place.is_some() {
+                confidence.min(1.0)
+            } else {
+                0.0
+            };
         }
         let needed = self.columns.len().div_ceil(2).max(1);
-        if count < needed {
-            return Err(SampleFault::TooFewPoints {
-                seen: count,
-                needed,
-            });
+        let enough = |seen: usize| {
+            if seen < needed {
+                return Err(SampleFault::TooFewPoints { seen, needed });
+            }
+            Ok(seen as f64 / self.columns.len() as f64)
+        };
+        let mut share = enough(count)?;
+        if !self.trust_tracker {
+            let (places, seen) = (&mut self.places, &mut self.seen);
+            let (outliers, weights) = (&mut self.outliers, &mut self.weights);
+            self.swaps.pass(sample.t, outliers, places, seen, weights);
+            outliers.pass(sample.t, places, seen);
+            share = enough(seen.iter().filter(|seen| **seen).count())?;
         }
-        self.motion = self
-            .fit
-            .remove(&self.places, Some(&self.seen), &mut self.fresh);
-        for (index, seen) in self.seen.iter().enumerate() {
-            if *seen {
-                self.local[index] = self.fresh[index];
+        if self.scale.is_none() {
+            self.scale = self.rest.push(sample.t, &self.places, &self.seen);
+            if let Some(scale) = self.scale {
+                self.fit.set_scale(scale);
+                // What was read at another scale is no history of this one.
+                self.readers.reset();
             }
         }
-        let flat = self.local.as_flattened();
-        let share = count as f64 / self.columns.len() as f64;
-        for ((plane, reading), estimate) in self
-            .planes
-            .iter()
-            .zip(&mut self.readings)
-            .zip(&mut self.estimates)
-        {
-            match reading {
-                Reading::Wave(estimator) => {
-                    estimator.push(sample.t, plane.apply(flat, self.with_variance));
-                    let wave = estimator.estimate();
-                    estimate.amplitude = wave.amplitude;
-                    estimate.frequency_hz = wave.frequency_hz;
-                    estimate.phase_rad = wave.phase_rad;
-                    estimate.quality = wave.quality;
-                }
-                Reading::Progression(smoother) => {
-                    let progression = smoother.push(sample.t, plane.apply(flat, false).z[0]);
-                    estimate.amplitude = progression;
-                    estimate.phase_rad = wrap_tau(TAU * progression);
-                    estimate.quality = share;
-                }
+        let seen = Some(&self.seen[..]);
+        // A fit without some of the points sees the body turned by as much as it would have seen the
+        // last pose, in which all points have a place, turned without them.
+        let lean = if share < 1.0 && self.last_t.is_some() {
+            let yaw = |seen| self.fit_whole.yaw(&self.local, seen);
+            wrap_pi(yaw(seen) - yaw(None))
+        } else {
+            0.0
+        };
+        self.motion = (self.fit).remove_leaning(&self.places, seen, lean, &mut self.fresh);
+        let mut filled = 0;
+        for (weight, seen) in self.weights.iter_mut().zip(&self.seen) {
+            if !*seen {
+                *weight = 0.0;
             }
+            filled += u64::from(*weight < 1.0);
         }
+        if filled == 0 {
+            self.local.copy_from_slice(&self.fresh);
+        } else {
+            let step_s = self.last_t.map_or(f64::INFINITY, |last| sample.t - last);
+            (self.completion).fill(step_s, &self.weights, &self.fresh, &mut self.local);
+            self.filled += filled;
+        }
+        self.readers
+            .push(sample.t, self.local.as_flattened(), share);
         let motion = &self.motion;
         self.channels[..GLOBAL_CHANNELS.len()].copy_from_slice(&[
             motion.yaw_rad,
@@ -332,7 +318,35 @@ impl FrontEnd {
 
     /// The estimates at the last sample, one per gesture in the order of the file.
     pub fn estimates(&self) -> &[GestureEstimate] {
-        &self.estimates
+        self.readers.estimates()
+    }
+
+    /// Goes to a node of the motion graph: from now on the gestures of its neighbourhood are read,
+    /// the others are silent. A node that does not exist changes nothing. Allocates nothing.
+    ///
+    /// Estimates are those of the last sample at once: every gesture is read in all neighbourhoods
+    /// where its plane differs, all the time.
+    pub fn set_active(&mut self, node: usize) {
+        self.readers.set_active(node);
+    }
+
+    /// Number of planes that are read: gestures times the neighbourhoods in which theirs differ.
+    pub fn planes(&self) -> usize {
+        self.readers.planes()
+    }
+
+    /// What of the tracker's had to be mended since the last reset.
+    pub fn tracking(&self) -> TrackingCounts {
+        TrackingCounts {
+            outliers: self.outliers.rejected(),
+            swapped: self.swaps.undone(),
+            filled: self.filled,
+        }
+    }
+
+    /// The performer's scale in use; `None` while it is still to be measured at rest.
+    pub fn performer_scale(&self) -> Option<f64> {
+        self.scale
     }
 
     /// The estimate of a gesture carried on to time `t`: the phase runs on at its frequency.
@@ -340,8 +354,8 @@ impl FrontEnd {
     /// For the instant the servo acts, and for coasting through a gap. A gesture that does not
     /// exist is silent; a time that is not finite changes nothing.
     pub fn predict(&self, gesture: usize, t: f64) -> GestureEstimate {
-        let Some(estimate) = self.estimates.get(gesture) else {
-            return silent(GestureKind::Cyclic);
+        let Some(estimate) = self.estimates().get(gesture) else {
+            return GestureEstimate::silent(GestureKind::Cyclic);
         };
         let mut ahead = *estimate;
         if let Some(last) = self.last_t
@@ -393,31 +407,17 @@ impl FrontEnd {
         self.last_t
     }
 
-    /// Forgets all samples; planes and channels' names stay.
+    /// Forgets all samples; planes, channels' names and the performer's scale stay.
     pub fn reset(&mut self) {
-        for reading in &mut self.readings {
-            match reading {
-                Reading::Wave(estimator) => estimator.reset(),
-                Reading::Progression(smoother) => smoother.reset(),
-            }
-        }
-        for estimate in &mut self.estimates {
-            *estimate = silent(estimate.kind);
-        }
+        self.readers.reset();
+        self.swaps.reset();
+        self.outliers.reset();
+        self.rest.reset();
+        self.filled = 0;
         self.local.copy_from_slice(&self.home);
         self.channels.fill(0.0);
         self.mixer.reset();
         self.motion = GlobalMotion::default();
         self.last_t = None;
-    }
-}
-
-fn silent(kind: GestureKind) -> GestureEstimate {
-    GestureEstimate {
-        amplitude: 0.0,
-        frequency_hz: 0.0,
-        phase_rad: 0.0,
-        quality: 0.0,
-        kind,
     }
 }

@@ -19,6 +19,7 @@ mod teach;
 mod teach_guidance;
 mod teach_search;
 mod teach_words;
+mod tracker;
 mod wave;
 
 pub use channel::{DerivedChannel, DerivedChannelError, LONGEST_SMOOTHING_S};
@@ -36,6 +37,7 @@ pub use set::{Gesture, GestureKind, GestureOptions, GestureSet};
 pub use teach::Teacher;
 pub use teach_guidance::{Guidance, Novelty};
 pub use teach_words::{Mark, TeachError, TeachOptions, TeachPhase, TeachView};
+pub use tracker::{PerformerScale, TrackingCounts};
 pub use wave::{
     CorrelationEstimator, DirectEstimator, Estimator, EstimatorKind, FastEstimator, GaborEstimator,
     LONGEST_GAP_S, LeastSquaresEstimator, PlanePoint, Shape, WaveEstimate,

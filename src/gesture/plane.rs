@@ -31,6 +31,8 @@ pub struct References {
     /// Root mean square distance of a frame from its gesture's mean, over all gestures, metres:
     /// divides poses so that one regularisation serves every tracker.
     pub scale_m: f64,
+    /// How far any point gets from its mean place in a gesture, metres.
+    pub reach_m: f64,
 }
 
 impl References {
@@ -77,11 +79,23 @@ impl References {
         } else {
             1.0
         };
+        let mut reach_m = 0.0_f64;
+        for (rows, mean) in local.iter().zip(&mean) {
+            for row in rows {
+                let away = row - mean;
+                let squares = away
+                    .as_slice()
+                    .chunks(3)
+                    .map(|p| p.iter().map(|v| v * v).sum());
+                reach_m = squares.fold(reach_m, |most, square: f64| most.max(square.sqrt()));
+            }
+        }
         Ok(Self {
             fit,
             local,
             mean,
             scale_m,
+            reach_m,
         })
     }
 }
@@ -171,12 +185,27 @@ impl Plane {
     /// step divides each component by the share the regression explains, so that the reference
     /// itself measures amplitude 1; a non-cyclic map is brought to exactly 0 and 1 at its marks.
     pub fn train(set: &GestureSet, references: &References, index: usize) -> Self {
+        Self::train_among(set, references, index, |_| true)
+    }
+
+    /// The same where only the gestures for which `competes` holds are kept apart from: those that
+    /// can be performed from one place in the motion graph (section 9.4.1). The gesture itself
+    /// always takes part.
+    pub fn train_among(
+        set: &GestureSet,
+        references: &References,
+        index: usize,
+        competes: impl Fn(usize) -> bool,
+    ) -> Self {
         let gesture = &set.gestures[index];
         let own = targets(set, references, index);
         let mean = &references.mean[index];
         let dim = mean.len();
         let mut inputs: Vec<(DVector<f64>, [f64; 2], f64)> = Vec::new();
         for (other, rows) in references.local.iter().enumerate() {
+            if other != index && !competes(other) {
+                continue;
+            }
             let weight = BLOCK_WEIGHT / rows.len().max(1) as f64;
             for (k, row) in rows.iter().enumerate() {
                 let target = if other == index { own[k] } else { [0.0; 2] };

@@ -11,7 +11,7 @@ use crate::pose::{PoseHeader, PoseSample};
 use crate::puppet::{Gestures, Puppet};
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
@@ -37,6 +37,8 @@ pub struct Handover {
     recent: Vec<PoseSample>,
     newest: usize,
     swaps: u64,
+    /// Bits of the performer's measured scale; not a number before.
+    scale: Arc<AtomicU64>,
 }
 
 /// The other end.
@@ -47,6 +49,7 @@ pub struct Loader {
     spare: Producer<PoseSample>,
     past: VecDeque<PoseSample>,
     under_way: bool,
+    scale: Arc<AtomicU64>,
 }
 
 /// Both ends, for a stream with `header`.
@@ -65,7 +68,9 @@ pub fn handover(header: &PoseHeader) -> (Handover, Loader) {
     let (history_in, history_out) = RingBuffer::new(UNDER_WAY);
     let (mut spare_in, spare_out) = RingBuffer::new(UNDER_WAY);
     while spare_in.push(blank()).is_ok() {}
+    let scale = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
     let ours = Handover {
+        scale: Arc::clone(&scale),
         fresh: fresh_out,
         old: old_in,
         history: history_in,
@@ -75,6 +80,7 @@ pub fn handover(header: &PoseHeader) -> (Handover, Loader) {
         swaps: 0,
     };
     let theirs = Loader {
+        scale,
         fresh: fresh_in,
         old: old_out,
         history: history_out,
@@ -111,6 +117,8 @@ impl Handover {
             self.swaps += u64::from(puppet.swap_gestures(&mut gestures));
             let _ = self.old.push(gestures);
         }
+        let scale = puppet.front().performer_scale().unwrap_or(f64::NAN);
+        self.scale.store(scale.to_bits(), Ordering::Relaxed);
         for sample in samples {
             self.newest = (self.newest + 1) % RECENT;
             copy(sample, &mut self.recent[self.newest]);
@@ -158,6 +166,12 @@ impl Loader {
         let back = self.old.pop().is_ok();
         self.under_way &= !back;
         back
+    }
+
+    /// The performer's scale as the puppet reads it; `None` before it is known.
+    pub fn performer_scale(&self) -> Option<f64> {
+        let scale = f64::from_bits(self.scale.load(Ordering::Relaxed));
+        scale.is_finite().then_some(scale)
     }
 
     /// Whether gestures offered before are still under way.
@@ -243,7 +257,7 @@ impl Watcher {
                         waiting = loader.offer(gestures).err();
                     } else if until_look.is_zero() && !loader.is_busy() {
                         until_look = LOOK_EVERY;
-                        match files.reload(&header) {
+                        match files.reload(&header, loader.performer_scale()) {
                             Ok(new) => {
                                 waiting = new.map(|new| {
                                     Box::new(Gestures::new(new.front, new.gesture_of_class))

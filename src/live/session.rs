@@ -12,7 +12,7 @@ use crate::base::{Clock, Time, VirtualClock};
 use crate::bus::{BusError, ServoBus, TorqueReport};
 use crate::config::file::{OnExit, OnLost, OnServoFault};
 use crate::config::{Character, ConfigError, GestureFiles};
-use crate::gesture::{FrontEnd, FrontEndError};
+use crate::gesture::{FrontEnd, FrontEndError, TrackingCounts};
 use crate::motion::graph::TransitionCounts;
 use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader, PoseSample};
 use crate::puppet::{LostPolicy, Puppet, PuppetOptions};
@@ -38,6 +38,10 @@ pub struct Report {
     pub before_header: u64,
     /// Samples that the front end refused.
     pub refused: u64,
+    /// What the front end mended of the tracker's.
+    pub tracking: TrackingCounts,
+    /// The performer's scale; `None` when it was to be measured and the pose was never still.
+    pub performer_scale: Option<f64>,
     /// Why the pose stream ended early, if it did.
     pub pose_error: Option<PoseError>,
     /// Cycles that were not recorded because the observer was slow.
@@ -68,7 +72,12 @@ pub fn puppet(
     header: &PoseHeader,
     rate_hz: f64,
 ) -> Result<Puppet, SessionError> {
-    let front = FrontEnd::new(&character.gestures, header, character.front_options)?;
+    let front = FrontEnd::with_neighbourhoods(
+        &character.gestures,
+        header,
+        character.front_options,
+        &character.neighbourhoods(),
+    )?;
     let front = character.with_channels(front)?;
     let mut animator = character.animator(&front)?;
     let end_pose = character.end_pose.clone().unwrap_or_else(|| {
@@ -93,6 +102,7 @@ pub fn puppet(
             lost_s: safety.lost_s,
             on_lost: match safety.on_lost {
                 OnLost::Idle => LostPolicy::Idle,
+                OnLost::Hold => LostPolicy::Hold,
                 OnLost::Stop => LostPolicy::Stop,
             },
         },
@@ -283,6 +293,8 @@ fn report(
         dropped,
         before_header: 0,
         refused: puppet.rejected_samples(),
+        tracking: puppet.front().tracking(),
+        performer_scale: puppet.front().performer_scale(),
         pose_error,
         records_lost,
         real_time,

@@ -19,4 +19,4 @@ pub mod weights;
 
 pub use animator::Animator;
 pub use clip::{Clip, ClipError};
-pub use smooth::ease;
+pub use smooth::{Follower, ease};

@@ -16,6 +16,7 @@
 //! - With fewer than three points and no anchor there is no body to speak of: nothing is removed.
 
 use super::PoseHeader;
+use crate::base::angle::wrap_pi;
 use std::f64::consts::PI;
 
 /// What is removed; `None` asks for the default of the point set.
@@ -53,6 +54,8 @@ pub struct GlobalFit {
     translation: bool,
     yaw: bool,
     height: bool,
+    /// What is left of a pose is enlarged by this.
+    scale: f64,
 }
 
 impl GlobalFit {
@@ -81,7 +84,14 @@ impl GlobalFit {
             translation: points >= 3 || (anchor.is_some() && points > 1),
             yaw: options.yaw.unwrap_or(solid && points >= 3),
             height: options.height.unwrap_or(anchor.is_some() || !solid),
+            scale: 1.0,
         })
+    }
+
+    /// Enlarges the poses that [`GlobalFit::remove`] leaves by `scale` from now on: about the body,
+    /// and in height about the ground where height is kept. What is removed stays in metres.
+    pub fn set_scale(&mut self, scale: f64) {
+        self.scale = scale;
     }
 
     /// Sets the weights from how much each point moves in `poses` (each a place per point).
@@ -173,6 +183,12 @@ impl GlobalFit {
         seen: Option<&[bool]>,
         out: &mut [[f64; 3]],
     ) -> GlobalMotion {
+        self.remove_leaning(points, seen, 0.0, out)
+    }
+
+    /// Yaw of the pose against the reference as fitted to the points that are seen, rad; 0 where
+    /// yaw is not removed.
+    pub fn yaw(&self, points: &[[f64; 3]], seen: Option<&[bool]>) -> f64 {
         let (body, home) = self.bodies(points, seen);
         let mut yaw = 0.0;
         if self.yaw {
@@ -185,16 +201,39 @@ impl GlobalFit {
             }
             yaw = sine.atan2(cosine);
         }
+        yaw
+    }
+
+    /// As [`GlobalFit::remove`], where the points that are seen are known to make the yaw `lean_rad`
+    /// larger than all of them would.
+    pub fn remove_leaning(
+        &self,
+        points: &[[f64; 3]],
+        seen: Option<&[bool]>,
+        lean_rad: f64,
+        out: &mut [[f64; 3]],
+    ) -> GlobalMotion {
+        let (body, home) = self.bodies(points, seen);
+        let mut yaw = self.yaw(points, seen);
+        if self.yaw && lean_rad != 0.0 {
+            yaw = wrap_pi(yaw - lean_rad);
+        }
         let (sin, cos) = yaw.sin_cos();
+        let scale = self.scale;
+        let rise = if self.height {
+            scale * body[1] - home[1]
+        } else {
+            0.0
+        };
         for (place, out) in points.iter().zip(out.iter_mut()) {
             if !self.translation {
-                *out = *place;
+                *out = place.map(|value| scale * value);
                 continue;
             }
-            let (x, z) = (place[0] - body[0], place[2] - body[2]);
+            let (x, z) = (scale * (place[0] - body[0]), scale * (place[2] - body[2]));
             *out = [
                 x * cos - z * sin + home[0],
-                place[1] - if self.height { body[1] - home[1] } else { 0.0 },
+                scale * place[1] - rise,
                 x * sin + z * cos + home[2],
             ];
         }

@@ -3,7 +3,7 @@
 use super::load;
 use crate::base::suggest;
 use crate::cli::{ExitStatus, Failure, poses, warn};
-use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet};
+use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet, PerformerScale};
 use crate::pose::Recording;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -14,6 +14,7 @@ pub(super) fn estimate(
     poses: &Path,
     out: &Path,
     estimator: &str,
+    scale: PerformerScale,
 ) -> Result<ExitStatus, Failure> {
     let kind = EstimatorKind::from_name(estimator).ok_or_else(|| {
         let names = EstimatorKind::NAMES;
@@ -28,6 +29,7 @@ pub(super) fn estimate(
     let (recording, _) = poses::read(poses)?;
     let options = FrontEndOptions {
         estimator: kind,
+        scale,
         ..FrontEndOptions::default()
     };
     let mut front = FrontEnd::new(&set, &recording.header, options)
@@ -45,6 +47,17 @@ pub(super) fn estimate(
             "{}: {refused} samples without estimate: too few points seen",
             poses.display()
         ));
+    }
+    match front.performer_scale() {
+        None => warn(format_args!(
+            "{}: no still second with all points seen, so no scale was measured; declare it with --scale NUMBER",
+            poses.display()
+        )),
+        Some(measured) if scale == PerformerScale::Rest => warn(format_args!(
+            "{}: performer's scale {measured:.3}",
+            poses.display()
+        )),
+        Some(_) => {}
     }
     Ok(ExitStatus::Done)
 }
