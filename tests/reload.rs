@@ -80,9 +80,7 @@ fn shown_again() -> GestureSet {
             place[1] + 0.03 * (place[0] * 400.0).sin(),
             place[2],
         ];
-        for other in 2..6 {
-            frame[other] = set.gestures[0].frames[0][other];
-        }
+        frame[2..].copy_from_slice(&set.gestures[0].frames[0][2..]);
     }
     set.gestures.push(extra);
     set
