@@ -191,6 +191,55 @@ fn a_twin_is_written_with_a_warning_that_names_the_other() {
 }
 
 #[test]
+fn keys_of_a_terminal_begin_and_keep_a_gesture() {
+    use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+    let folder = Folder::empty();
+    let keyboard = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
+    grantpt(&keyboard).expect("granted");
+    unlockpt(&keyboard).expect("unlocked");
+    let name = ptsname(&keyboard, Vec::new()).expect("its name");
+    let terminal = std::fs::OpenOptions::new()
+        .read(true)
+        .write(true)
+        .open(name.to_str().expect("plain"))
+        .expect("the terminal");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_handwave"))
+        .args([
+            "gesture",
+            "define",
+            "--input",
+            &source("waiting.csv"),
+            "--name",
+            "drum",
+        ])
+        .args(["--into", &folder.text("taught.toml")])
+        .stdin(terminal)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let press = |key: &[u8]| rustix::io::write(&keyboard, key).expect("a key");
+    let mut err = BufReader::new(child.stderr.take().expect("piped"));
+    let mut said = String::new();
+    for (until, key) in [("space begins", &b" "[..]), ("keeps it", b"\x1b[6~")] {
+        while !said.contains(until) {
+            let before = said.len();
+            err.read_line(&mut said).expect("text");
+            assert!(said.len() > before, "no {until:?} in {said}");
+        }
+        press(key);
+    }
+    err.read_to_string(&mut said).expect("text");
+    assert_eq!(child.wait().expect("a child").code(), Some(0), "{said}");
+    let set = GestureSet::load(&folder.path("taught.toml")).expect("a gesture file");
+    assert!(
+        (set.gestures[0].duration_s - 1.08).abs() < 0.05,
+        "{}",
+        set.gestures[0].duration_s
+    );
+}
+
+#[test]
 fn a_gesture_is_taught_over_the_network_hands_free() {
     let folder = Folder::empty();
     let into = folder.text("taught.toml");

@@ -3,7 +3,7 @@
 mod support;
 
 use handwave::live::feed::SenderClock;
-use handwave::pose::PoseSample;
+use handwave::pose::{PoseFormat, PoseReader, PoseSample};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::UdpSocket;
 use std::path::Path;
@@ -68,6 +68,58 @@ fn a_senders_clock_is_found_through_jitter_drift_and_restarts() {
     let mut samples = at(&[0.55, 0.1, 0.116]);
     clock.map(latest + 0.4, &mut samples);
     assert!((samples[2].t - (latest + 0.4)).abs() < 1e-9, "{samples:?}");
+}
+
+/// The times that a tolerant reader lets pass, or its error.
+fn tolerated(lines: &[String]) -> (Vec<f64>, u64, Option<String>) {
+    let header = r#"{"handwave":"poses","version":1,"points":["a"]}"#;
+    let text = format!("{header}\n{}\n", lines.join("\n"));
+    let input = std::io::Cursor::new(text.into_bytes());
+    let mut reader = PoseReader::new(input, PoseFormat::JsonLines, "sender")
+        .expect("a header")
+        .tolerant();
+    let (mut passed, mut error) = (Vec::new(), None);
+    for sample in &mut reader {
+        match sample {
+            Ok(sample) => passed.push(sample.t),
+            Err(e) => error = Some(e.to_string()),
+        }
+    }
+    (passed, reader.counts().total(), error)
+}
+
+fn line(t: f64) -> String {
+    format!("{{\"t\":{t},\"p\":[[0.1,0.2,0.3]]}}")
+}
+
+#[test]
+fn a_live_reader_forgives_what_ends_a_file_but_not_a_stranger() {
+    let good = |from: f64, count: u32| (0..count).map(move |k| line(from + f64::from(k) * 0.02));
+    let junk = |count: usize| std::iter::repeat_n("{\"t\":0,".to_owned(), count);
+    // Thirty bad ones in a row from a sender that was good for a second.
+    let lines: Vec<String> = good(0.0, 60).chain(junk(30)).chain(good(2.0, 60)).collect();
+    let (passed, dropped, error) = tolerated(&lines);
+    assert_eq!((passed.len(), dropped, error), (120, 30, None));
+    // Started again with its clock at zero: one sample.
+    let lines: Vec<String> = good(500.0, 60).chain(good(0.0, 60)).collect();
+    let (passed, dropped, error) = tolerated(&lines);
+    assert_eq!((passed.len(), dropped, error), (119, 1, None));
+    // Overtaken datagrams are late, not a new clock.
+    let mut lines: Vec<String> = good(5.0, 100).collect();
+    lines.swap(70, 73);
+    let (passed, dropped, error) = tolerated(&lines);
+    assert_eq!((passed.len(), dropped, error), (97, 3, None));
+    // What never spoke the format is told so.
+    for stranger in [
+        junk(12).collect::<Vec<_>>(),
+        (0..12).map(|k| line(f64::from(k) * 33_333.0)).collect(),
+    ] {
+        let (_, _, error) = tolerated(&stranger);
+        assert!(
+            error.is_some_and(|e| e.contains("10 bad samples in a row")),
+            "{stranger:?}"
+        );
+    }
 }
 
 #[test]

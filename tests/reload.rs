@@ -1,5 +1,4 @@
 //! Gestures defined again while a run goes on: no jump, no allocation, and a bad file changes nothing.
-#![allow(unsafe_code, reason = "a global allocator that counts")]
 
 mod support;
 
@@ -7,46 +6,14 @@ use handwave::gesture::{CyclicMarks, FrontEnd, GestureSet, define_cyclic};
 use handwave::live::reload::handover;
 use handwave::pose::Recording;
 use handwave::puppet::{Gestures, Stage};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use support::character::{Player, RATE_HZ, built_in, performance};
+use support::counting::{Counting, calls};
 use support::folder::Folder;
 use support::limits::LimitWatch;
 use support::program::{handwave, refused, run_virtual};
-
-/// Counts what each thread asks of the memory, giving back included.
-struct Counting;
-
-thread_local! {
-    static CALLS: Cell<u64> = const { Cell::new(0) };
-}
-
-fn count() {
-    // Not counted while the thread ends.
-    let _ = CALLS.try_with(|n| n.set(n.get() + 1));
-}
-
-// SAFETY: hands everything to the system's allocator and only counts beside it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: as above.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -107,11 +74,11 @@ fn gestures_swapped_in_full_motion_make_no_jump_and_touch_no_memory() {
         let (mut worst_change, mut usual_change) = (0.0_f64, 0.0_f64);
         let mut held_back = 0;
         while player.t_s() < 24.0 {
-            let calls = CALLS.with(Cell::get);
+            let before = calls();
             player.step_after(true, |puppet, samples| ours.cycle(puppet, samples));
-            let calls = CALLS.with(Cell::get) - calls;
-            if calls > 0 && player.cycle > 10 && touched.len() < 5 {
-                touched.push((player.cycle, calls));
+            let made = calls() - before;
+            if made > 0 && player.cycle > 10 && touched.len() < 5 {
+                touched.push((player.cycle, made));
             }
             plain.step(true);
             // The other thread's turn.
@@ -279,6 +246,7 @@ fn a_run_loads_changed_gestures_and_keeps_the_old_ones_over_bad_files() {
     });
     let pid = i32::try_from(child.id()).expect("a process id");
     // SAFETY: sends a signal to a child of this process that was not waited for yet.
+    #[allow(unsafe_code)]
     let sent = unsafe { libc::kill(pid, libc::SIGINT) };
     assert_eq!(sent, 0);
     let (mut said, mut printed) = (String::new(), String::new());

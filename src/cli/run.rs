@@ -11,7 +11,7 @@ use crate::gesture::PerformerScale;
 use crate::live::control::Ending;
 use crate::live::reload::News;
 use crate::live::session::{self, Observer, Report, Session};
-use crate::live::source::{self, Source, SourceError};
+use crate::live::source::{self, Source};
 use crate::live::wire::{self, WireError};
 use crate::live::{CycleRecord, RealClock, StopSwitch};
 use crate::sim::FaultSpec;
@@ -162,10 +162,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         Some(_) => source::working_folder(),
         None => character.files.clone(),
     };
-    let source = match source::open_any(&character.source, &folder, &stop) {
-        Err(SourceError::Interrupted) => return Ok(ExitStatus::Interrupted),
-        opened => opened.map_err(Failure::input)?,
-    };
+    let source = source::open_any(&character.source, &folder, &stop)?;
     if let Some(assumption) = source.reader.assumption() {
         warn(format_args!("{assumption}"));
     }
@@ -275,13 +272,7 @@ fn session(
     stop: StopSwitch,
 ) -> Result<Session<Box<dyn BufRead + Send>>, Failure> {
     let reload = reload(options, character, source.live.is_some())?;
-    let first = source.first_sample().map_err(|e| match e {
-        SourceError::Interrupted => Failure {
-            status: ExitStatus::Interrupted,
-            message: e.to_string(),
-        },
-        other => Failure::input(other),
-    })?;
+    let first = source.first_sample()?;
     let puppet =
         session::puppet(character, source.reader.header(), rate_hz).map_err(Failure::input)?;
     let wire = wire::open(character, &character.bus, clock, rate_hz).map_err(|e| match e {

@@ -266,8 +266,8 @@ impl Teacher {
         search::MOVED * crate::pose::global::size_of(&self.places).max(1e-3)
     }
 
-    /// What was recorded, as a recording, with poses without global motion fitted to the sample at `since`.
-    fn recorded(&self, since: f64) -> Result<(Recording, Vec<Vec<f64>>, usize), TeachError> {
+    /// What was recorded, with its poses without global motion fitted to the sample at `since`.
+    fn recorded(&self, since: f64) -> Result<search::Motion, TeachError> {
         let recording = Recording {
             header: self.stream.clone(),
             samples: self.samples.iter().cloned().collect(),
@@ -275,21 +275,19 @@ impl Teacher {
         let frames = frames_of(&self.set, &recording)?;
         let start = recording.samples.partition_point(|s| s.t < since - 1e-9);
         let start = start.min(recording.samples.len().saturating_sub(1));
-        let local = local_of(&self.set, &frames, start)?;
-        Ok((recording, local, start))
+        Ok(search::Motion {
+            local: local_of(&self.set, &frames, start)?,
+            recording,
+            start,
+            points: self.columns.len(),
+            needed_m: self.needed_m(),
+        })
     }
 
     /// Looks for the end.
     fn look(&mut self, since: f64, begun: f64) {
-        let Ok((recording, local, start)) = self.recorded(since) else {
+        let Ok(motion) = self.recorded(since) else {
             return;
-        };
-        let motion = search::Motion {
-            recording: &recording,
-            local: &local,
-            start,
-            points: self.columns.len(),
-            needed_m: self.needed_m(),
         };
         self.moved = self.moved || motion.moved_m() > motion.needed_m;
         if !self.moved {
@@ -316,7 +314,7 @@ impl Teacher {
             }
             GestureKind::NonCyclic => {
                 if let Some(found) = motion.extreme() {
-                    let outcome = self.non_cyclic(&recording, found);
+                    let outcome = self.non_cyclic(&motion.recording, found);
                     self.over(outcome);
                 }
             }
@@ -341,19 +339,13 @@ impl Teacher {
     }
 
     fn marked(&self, since: f64) -> Result<Definition, TeachError> {
-        let (recording, local, start) = self.recorded(since)?;
+        let motion = self.recorded(since)?;
+        let (recording, start) = (&motion.recording, motion.start);
         let frames = recording.samples.len() - start;
         if frames < FEWEST_FRAMES {
             return Err(TeachError::TooShort { frames });
         }
         let end_s = recording.span_s().1;
-        let motion = search::Motion {
-            recording: &recording,
-            local: &local,
-            start,
-            points: self.columns.len(),
-            needed_m: self.needed_m(),
-        };
         let (name, source) = (&self.options.name, &self.options.source);
         match self.options.kind {
             GestureKind::NonCyclic => {
@@ -362,7 +354,7 @@ impl Teacher {
                     rest_s,
                     extreme_s: end_s,
                 };
-                self.non_cyclic(&recording, found)
+                self.non_cyclic(recording, found)
             }
             GestureKind::Cyclic => {
                 // Several periods tell their length better than a hand on a key; one is as marked.
@@ -383,14 +375,8 @@ impl Teacher {
         if self.samples.is_empty() || !self.seen.iter().all(|seen| *seen) {
             return Err(TeachError::NoPoses(self.never_seen()));
         }
-        let (recording, local, start) = self.recorded(since)?;
-        let motion = search::Motion {
-            recording: &recording,
-            local: &local,
-            start,
-            points: self.columns.len(),
-            needed_m: self.needed_m(),
-        };
+        let motion = self.recorded(since)?;
+        let (recording, start) = (&motion.recording, motion.start);
         let seconds = (self.now - since).max(0.0);
         let moved_m = motion.moved_m();
         if moved_m <= motion.needed_m {
@@ -402,7 +388,7 @@ impl Teacher {
         }
         if self.options.kind == GestureKind::NonCyclic {
             return match motion.extreme() {
-                Some(found) => self.non_cyclic(&recording, found),
+                Some(found) => self.non_cyclic(recording, found),
                 None => Err(TeachError::NoExtreme { seconds }),
             };
         }

@@ -38,15 +38,15 @@ pub(super) struct Found {
 }
 
 /// A recorded stretch, its poses without global motion, and where the performance may begin.
-pub(super) struct Motion<'a> {
-    pub recording: &'a Recording,
-    pub local: &'a [Vec<f64>],
+pub(super) struct Motion {
+    pub recording: Recording,
+    pub local: Vec<Vec<f64>>,
     pub start: usize,
     pub points: usize,
     pub needed_m: f64,
 }
 
-impl Motion<'_> {
+impl Motion {
     fn t(&self, index: usize) -> f64 {
         self.recording.samples[index].t
     }
@@ -79,7 +79,7 @@ impl Motion<'_> {
             return None;
         }
         let step = (self.span_s() / (samples - 1) as f64).max(1e-3);
-        find_period(&resampled(self.recording, self.local, from, step), step)
+        find_period(&resampled(&self.recording, &self.local, from, step), step)
     }
 
     /// Whether the stretch holds `count` periods.
@@ -103,7 +103,7 @@ impl Motion<'_> {
         let from = self.from();
         let samples = self.local.len().saturating_sub(from).max(2);
         let step = (self.span_s() / (samples - 1) as f64).max(1e-3);
-        let rows = resampled(self.recording, self.local, from, step);
+        let rows = resampled(&self.recording, &self.local, from, step);
         let lag = (period_s / step).round() as usize;
         let half = (COMPARED * period_s / step) as usize;
         let last = rows.len().saturating_sub(lag + half + 1);

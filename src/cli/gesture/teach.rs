@@ -11,7 +11,7 @@ use crate::gesture::{
 };
 use crate::live::feed::{Feed, ReaderFeed, read_ahead};
 use crate::live::keys::Keys;
-use crate::live::source::{self, SourceError};
+use crate::live::source;
 use crate::live::teach::{Lesson, Taught, teach};
 use crate::live::{RealClock, StopSwitch};
 use std::io::{IsTerminal, Write};
@@ -56,14 +56,8 @@ pub(super) fn run(args: &DefineArgs, input: &str) -> Result<ExitStatus, Failure>
     let stop = StopSwitch::new();
     stop.on_signals()
         .map_err(|e| Failure::input(format!("cannot listen for signals: {e}")))?;
-    let mut opened = match source::open_any(input, &source::working_folder(), &stop) {
-        Err(SourceError::Interrupted) => return Ok(ExitStatus::Interrupted),
-        opened => opened.map_err(Failure::input)?,
-    };
-    let first = match opened.first_sample() {
-        Err(SourceError::Interrupted) => return Ok(ExitStatus::Interrupted),
-        first => first.map_err(Failure::input)?,
-    };
+    let mut opened = source::open_any(input, &source::working_folder(), &stop)?;
+    let first = opened.first_sample()?;
     if let Some(assumption) = opened.reader.assumption() {
         warn(format_args!("{assumption}"));
     }
@@ -295,7 +289,8 @@ impl Screen {
             .map_or(String::new(), |n| format!(" near `{}`", self.names[n]));
         let label = format!("{:3.0} % new{near}", 100.0 * view.movement);
         if self.colour {
-            let green = (255.0 * view.movement) as u8;
+            // In steps of the bar, so that the line is not drawn again for nothing.
+            let green = (255 * full.min(BAR) / BAR) as u8;
             format!("\x1b[38;2;{};{green};0m[{bar}]\x1b[0m {label}", 255 - green)
         } else {
             format!("[{bar}] {label}")
