@@ -3,14 +3,15 @@
 //! No I/O, no lock, no clock, and after the first cycles no allocation. Live runs, replays, tests
 //! and benchmarks call this one function, so the same input gives the same bytes out.
 
-use crate::base::angle::{wrap_pi, wrap_tau};
+mod gaps;
+
 use crate::base::{JointState, Time};
 use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
 use crate::motion::class::Drive;
-use crate::motion::{Animator, Follower, ease};
+use crate::motion::{Animator, ease};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
-use std::f64::consts::TAU;
+use gaps::{GAP_S, Join, Tempo};
 
 /// What happens when poses have been missing for longer than `lost_s`.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -143,86 +144,6 @@ struct Ramp {
     seconds: f64,
 }
 
-/// How fast the puppet's own time runs: 1 while poses come, 0 while a pose is held.
-///
-/// To hold is to let time stand still: phases, blends, layers and transitions all stop where they
-/// are and go on from there, and no joint's speed jumps.
-#[derive(Copy, Clone, Debug)]
-struct Tempo {
-    value: f64,
-    /// Time by which the gestures' phases have been held back while poses are missing, seconds.
-    held_s: f64,
-}
-
-/// Highest change of tempo per second, down and up: what it adds to a joint's acceleration is this
-/// times its speed.
-const TEMPO_CHANGE: [f64; 2] = [4.0, 2.0];
-
-impl Tempo {
-    /// Moves towards `goal` and returns the puppet's time that passes in `dt_s`.
-    fn step(&mut self, goal: f64, dt_s: f64) -> f64 {
-        let [down, up] = TEMPO_CHANGE.map(|change| change * dt_s);
-        self.value += (goal - self.value).clamp(-down, up);
-        dt_s * self.value
-    }
-}
-
-/// A gesture's wave as a class is given it: what jumps after a gap in the poses is drawn over.
-#[derive(Copy, Clone, Debug, Default)]
-struct Join {
-    /// Phase of the gesture in the last cycle, rad.
-    phase_rad: f64,
-    /// What the class is given beyond the gesture's phase, rad; on its way to zero.
-    offset: Follower,
-    /// Frequency that the class was given last, Hz.
-    frequency_hz: f64,
-    /// There was a gap, and the frequency has not come up with the gesture's since.
-    joining: bool,
-}
-
-/// Poses that have been missing for this long have left a gap, seconds: estimators may jump after it.
-const GAP_S: f64 = 0.08;
-/// A phase that is further than this from where it was going has jumped, rad.
-const PHASE_JUMP: f64 = 0.4;
-/// How quickly a jump of phase is made good, 1/s, and at most at this part of the tempo: less than the
-/// class is able to, so that joints have something left for all else that changed meanwhile.
-const PHASE_JOIN: (f64, f64) = (2.0, 0.25);
-/// How quickly frequency may change after a gap, Hz/s.
-const FREQUENCY_JOIN: f64 = 1.5;
-
-impl Join {
-    /// Frequency and phase for a class that does or does not move now.
-    fn step(&mut self, wave: &GestureEstimate, gap: bool, moving: bool, dt_s: f64) -> (f64, f64) {
-        let jump = wrap_pi(wave.phase_rad - self.phase_rad - TAU * wave.frequency_hz * dt_s);
-        self.phase_rad = wave.phase_rad;
-        if !moving {
-            *self = Self {
-                phase_rad: wave.phase_rad,
-                frequency_hz: wave.frequency_hz,
-                ..Self::default()
-            };
-            return (wave.frequency_hz, wave.phase_rad);
-        }
-        self.joining |= gap;
-        if jump.abs() > PHASE_JUMP {
-            self.offset.value = wrap_pi(self.offset.value - jump);
-        }
-        let left = wave.frequency_hz - self.frequency_hz;
-        let most = FREQUENCY_JOIN * dt_s;
-        // Silence has no frequency worth following.
-        if self.joining && wave.amplitude > 0.0 && left.abs() > most {
-            self.frequency_hz += left.clamp(-most, most);
-        } else if wave.amplitude > 0.0 || !self.joining {
-            self.frequency_hz = wave.frequency_hz;
-            self.joining = gap;
-        }
-        let (quickness, share) = PHASE_JOIN;
-        let fastest = share * TAU * self.frequency_hz.abs();
-        let offset = self.offset.step(0.0, quickness, fastest, dt_s);
-        (self.frequency_hz, wrap_tau(wave.phase_rad + offset))
-    }
-}
-
 /// Share of a joint's speed and acceleration that ramps use.
 const RAMP_SHARE: f64 = 0.5;
 /// A class of lower amplitude stands still for all one can see.
@@ -265,10 +186,7 @@ impl Puppet {
                 seconds: 0.0,
             },
             playing_since: None,
-            tempo: Tempo {
-                value: 1.0,
-                held_s: 0.0,
-            },
+            tempo: Tempo::default(),
             rejected: 0,
             pose: vec![0.0; joints],
             last_pose: vec![0.0; joints],
@@ -354,8 +272,7 @@ impl Puppet {
         std::mem::swap(&mut self.estimates, &mut other.estimates);
         std::mem::swap(&mut self.channels, &mut other.channels);
         for join in &mut self.joins {
-            // As after a gap: what jumps is drawn over.
-            join.joining = true;
+            join.expect_a_jump();
         }
         true
     }

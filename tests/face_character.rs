@@ -180,6 +180,13 @@ fn the_face_plays_to_its_end_in_the_program() {
     let summary = ended.json();
     assert_eq!(summary["ending"], "performance complete");
     assert_eq!(summary["envelope_cycles"], 0, "{}", ended.out);
+    let face = configs("performances/face.csv").display().to_string();
+    let info = handwave(&["poses", "info", &face, "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(info["channels"][0], "JawOpen");
+    let most = info["channel_values"][0]["max"].as_f64().expect("a number");
+    assert!((0.85..=1.0).contains(&most), "the mouth opens to {most}");
     let (recording, _) = Recording::read(&configs("performances/face.csv")).expect("bundled");
     assert_eq!(summary["samples"], recording.samples.len());
     // A hand's gestures over a face: said by name, before anything moves.

@@ -3,8 +3,9 @@
 
 mod gesture_support;
 
-use gesture_support::{Path, header, pose, sample, times, wave_set};
-use handwave::gesture::{DerivedChannel, FrontEnd, FrontEndOptions};
+use gesture_support::{Path, Random, header, pose, sample, times, wave_set};
+use handwave::gesture::{DerivedChannel, FrontEnd, FrontEndOptions, PerformerScale};
+use handwave::pose::PoseSample;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -29,6 +30,29 @@ unsafe impl GlobalAlloc for Counting {
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
+
+/// A stream in which everything goes wrong that is mended: points missing, jumping and doubted,
+/// hands exchanged, after a second of rest.
+fn troubled(until_s: f64) -> Vec<PoseSample> {
+    let mut random = Random(3);
+    let mut samples = Vec::new();
+    for t in times(120.0, until_s, 0.3, 1) {
+        let size = if t < 1.5 { 0.0 } else { 1.0 };
+        let mut shown = sample(t, &pose(Path::Line, size, 6.0 * t));
+        shown.confidence = vec![1.0; 6];
+        if t > 2.0 {
+            match (20.0 * random.unit()) as usize {
+                0 => shown.points[5] = None,
+                1 => shown.points[2] = shown.points[2].map(|[x, y, z]| [x + 0.8, y, z]),
+                2 => shown.points.swap(3, 5),
+                3 => shown.confidence[4] = 0.5,
+                _ => {}
+            }
+        }
+        samples.push(shown);
+    }
+    samples
+}
 
 #[test]
 fn push_estimate_and_predict_allocate_nothing() {
@@ -61,4 +85,34 @@ fn push_estimate_and_predict_allocate_nothing() {
     let after = ALLOCATIONS.load(Ordering::Relaxed);
     assert!(sum > 0.0);
     assert_eq!(after - before, 0, "allocations in {} pushes", samples.len());
+
+    let mut stream = header();
+    stream.points[4] = "elbow".into();
+    let mut set = set;
+    set.header.points[4] = "elbow".into();
+    let options = FrontEndOptions {
+        scale: PerformerScale::Rest,
+        ..FrontEndOptions::default()
+    };
+    let nodes = [vec![0], vec![]];
+    let mut front = FrontEnd::with_neighbourhoods(&set, &stream, options, &nodes).expect("match");
+    let samples = troubled(6.0);
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    for (k, sample) in samples.iter().enumerate() {
+        front.push(sample).ok();
+        front.set_active(k / 100 % 2);
+    }
+    let after = ALLOCATIONS.load(Ordering::Relaxed);
+    let mended = front.tracking();
+    assert!(
+        mended.outliers > 10 && mended.swapped > 10 && mended.filled > mended.outliers,
+        "{mended:?}"
+    );
+    assert!(front.performer_scale().is_some(), "never measured");
+    assert_eq!(
+        after - before,
+        0,
+        "allocations in {} troubled pushes",
+        samples.len()
+    );
 }

@@ -113,7 +113,7 @@ fn noise_above(threshold: f64, rate: f64) -> f64 {
         let z = [0.3 * random.normal(), 0.3 * random.normal()];
         let point = PlanePoint {
             z,
-            variance: [1.0, 1.0],
+            ..PlanePoint::default()
         };
         estimator.push(k as f64 / rate, point);
         if k as f64 > 6.0 * rate {

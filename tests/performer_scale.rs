@@ -4,7 +4,9 @@ mod gesture_support;
 mod support;
 
 use handwave::base::wrap_pi;
-use handwave::gesture::{FrontEnd, FrontEndError, FrontEndOptions, GestureSet, PerformerScale};
+use handwave::gesture::{
+    FrontEnd, FrontEndError, FrontEndOptions, GestureKind, GestureSet, PerformerScale,
+};
 use handwave::pose::{PoseHeader, PoseSample, Recording};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -83,16 +85,16 @@ fn scales_that_nobody_has_are_refused() {
     }
 }
 
-/// Largest differences between the waves of two front ends over the performance: amplitude, cycles.
-/// While drumming (from 3 s into each stretch of it) and, of amplitude, at any time from 2 s on: the
-/// first second is what a scale may be measured in.
+/// Differences between the waves of two front ends over the performance: amplitude, cycles.
+/// On average while drumming (from 3 s into each stretch of it) and, of amplitude, at any time from 2 s
+/// on: the first second is what a scale may be measured in.
 fn difference(
     (one, other): (&mut FrontEnd, &mut FrontEnd),
     samples: &[PoseSample],
     others: &[PoseSample],
 ) -> [f64; 3] {
     let stretches = recipe::drumming();
-    let (mut amplitude, mut phase, mut ever) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut amplitude, mut phase, mut ever, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
     for (sample, scaled) in samples.iter().zip(others) {
         one.push(sample).expect("good sample");
         other.push(scaled).expect("good sample");
@@ -103,15 +105,14 @@ fn difference(
             if sample.t > 2.0 {
                 ever = ever.max(off);
             }
-            if drumming {
-                amplitude = amplitude.max(off);
-                if a.amplitude > 0.3 {
-                    phase = phase.max(wrap_pi(a.phase_rad - b.phase_rad).abs() / TAU);
-                }
+            if drumming && a.kind == GestureKind::Cyclic {
+                count += 1.0;
+                amplitude += off;
+                phase += wrap_pi(a.phase_rad - b.phase_rad).abs() / TAU;
             }
         }
     }
-    [amplitude, phase, ever]
+    [amplitude / count, phase / count, ever]
 }
 
 #[test]

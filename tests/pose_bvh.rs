@@ -2,6 +2,7 @@
 
 mod support;
 
+use handwave::gesture::{CyclicMarks, FrontEnd, FrontEndOptions, GestureSet, define_cyclic};
 use handwave::pose::bvh::{BvhFile, BvhOptions, LengthUnit, UnitGuess, to_recording};
 use handwave::pose::{PoseFormat, PoseReader, Recording};
 use proptest::prelude::*;
@@ -414,4 +415,43 @@ fn bones_of_recorded_people_keep_their_length() {
         }
     }
     assert_eq!(files, 20, "clips");
+}
+
+#[test]
+fn a_walk_shown_once_reads_the_stride_of_other_walkers() {
+    let Some(folder) = shared_data("human_bvh") else {
+        return;
+    };
+    let shown = read(&folder.join("dataset-1_walk_normal_001.bvh"));
+    let mut set = GestureSet::new(&shown.header, Vec::new());
+    let marks = CyclicMarks {
+        start_s: 2.0,
+        end_s: None,
+    };
+    let definition = define_cyclic(&set, &shown, "walk", "test", marks).expect("periodic");
+    set.put(definition.gesture);
+    // Stride frequencies measured beside the recordings, in Hz.
+    for (name, measured_hz) in [
+        ("dataset-1_walk_normal_001", 0.930),
+        ("dataset-2_walk_normal_001", 0.908),
+        ("dataset-2_walk_active_001", 0.989),
+        ("dataset-2_walk_exhausted_001", 0.886),
+    ] {
+        let walk = read(&folder.join(format!("{name}.bvh")));
+        let mut front =
+            FrontEnd::new(&set, &walk.header, FrontEndOptions::default()).expect("same joints");
+        let (mut sum, mut count) = (0.0, 0.0);
+        for sample in &walk.samples {
+            front.push(sample).expect("a good sample");
+            if (3.0..6.0).contains(&sample.t) {
+                sum += front.estimates()[0].frequency_hz;
+                count += 1.0;
+            }
+        }
+        let found_hz = sum / count;
+        assert!(
+            (found_hz / measured_hz - 1.0).abs() < 0.05,
+            "{name}: a stride of {found_hz:.3} Hz, measured {measured_hz}"
+        );
+    }
 }

@@ -58,6 +58,11 @@ fn wrong_recordings_are_refused_with_their_line_and_what_is_allowed() {
         ("", &plain, "no recording of a known kind; known: bvh, leap"),
         ("Some words.\n", &plain, "known: bvh, leap"),
         ("1,2,3\n", &plain, "--rate HZ"),
+        (
+            "HIERARCHY\n",
+            &rate(60.0, &[]),
+            "--rate belongs to recordings of kind table; this one is read as bvh",
+        ),
         ("1,2,3\n", &rate(0.0, &[]), "0.01 to 10000 Hz"),
         ("1,2,3\n", &rate(f64::NAN, &[]), "0.01 to 10000 Hz"),
         (

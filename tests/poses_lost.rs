@@ -151,16 +151,32 @@ fn with_on_lost_stop_the_run_lies_down() {
 /// A hand that drums as in its gesture, at any phase and place.
 struct Hand {
     gesture: Gesture,
+    spread: Gesture,
     header: PoseHeader,
 }
 
 impl Hand {
     fn of(character: &Character) -> Self {
-        let drum = character.gestures.index_of("drum").expect("drumming");
+        let gesture = |name| {
+            let index = character
+                .gestures
+                .index_of(name)
+                .expect("a bundled gesture");
+            character.gestures.gestures[index].clone()
+        };
         Self {
-            gesture: character.gestures.gestures[drum].clone(),
+            gesture: gesture("drum"),
+            spread: gesture("splay"),
             header: character.gestures.header.clone(),
         }
+    }
+
+    /// With fingers spread.
+    fn spread(&self, t: f64) -> PoseSample {
+        let mut shown = self.sample(t, 0.0, 1.0, 0.0, 0.0);
+        let widest = self.spread.frames.last().expect("frames");
+        shown.points = widest.iter().map(|place| Some(*place)).collect();
+        shown
     }
 
     /// At `phase`, drumming at `size`, turned by `yaw` about the vertical and raised by `rise`.
@@ -298,6 +314,12 @@ fn poses_come_back(on_lost: OnLost) {
                 sweep.held_back, 0,
                 "gap {gap_s} s, case {case}: while missing"
             );
+            if case % 4 == 0 {
+                // Another gesture altogether, and again a gap before the drumming.
+                sweep.go_on(2.0, Some(&|t| hand.spread(t)));
+                sweep.go_on(gap_s, None);
+                assert_eq!(sweep.held_back, 0, "gap {gap_s} s, case {case}: spread");
+            }
             // Two fifths of a turn on: three gaps of a length see three phase differences.
             offset += 0.4 * TAU;
             hz = [0.9, 1.4, 1.1][case as usize % 3];
@@ -358,7 +380,7 @@ fn poses_that_come_back_held_start_nothing() {
 }
 
 #[test]
-fn drops_and_a_short_hole_start_no_transition() {
+fn drops_a_short_hole_and_changing_rates_start_no_transition() {
     let character = built_in();
     let begins_s = character.safety.ramp_s + 0.005;
     let play = |heard: &dyn Fn(u64, f64) -> bool| {
@@ -383,6 +405,15 @@ fn drops_and_a_short_hole_start_no_transition() {
             && !(8.0..8.3).contains(&t_s)
             && !(16.0..16.3).contains(&t_s)
     });
+    // 108 Hz, then 22 Hz, then 54 Hz, all in mid-gesture.
+    let uneven = play(&|cycle, t_s| match t_s {
+        ..15.0 => true,
+        15.0..31.0 => cycle % 5 == 0,
+        _ => cycle % 2 == 0,
+    });
+    println!("at rates that change at {:.2?} s", uneven.0);
+    assert_eq!(whole.1, uneven.1, "transitions differ");
+    assert_eq!(uneven.0.len(), whole.0.len(), "a transition began");
     println!(
         "transitions begin at {:.2?} s, with drops at {:.2?} s",
         whole.0, lossy.0

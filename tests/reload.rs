@@ -37,17 +37,12 @@ fn shown_again() -> GestureSet {
         let found = define_cyclic(&set, &recording, name, "again", marks).expect("periodic");
         set.put(found.gesture);
     }
-    // The extra gesture moves what the drum does not: else the two would share the movement.
-    let extra = set.gestures.pop().expect("three gestures");
-    let mut extra = extra;
-    for frame in &mut extra.frames {
-        let place = frame[1];
-        frame[1] = [
-            place[0],
-            place[1] + 0.03 * (place[0] * 400.0).sin(),
-            place[2],
-        ];
-        frame[2..].copy_from_slice(&set.gestures[0].frames[0][2..]);
+    // The extra gesture moves the thumb sideways, which the drum hardly does.
+    let mut extra = set.gestures.pop().expect("three gestures");
+    let home = extra.frames[0].clone();
+    for (frame, t) in extra.frames.iter_mut().zip(&extra.times_s) {
+        frame.clone_from(&home);
+        frame[1][0] += 0.03 * (std::f64::consts::TAU * t / extra.duration_s).sin();
     }
     set.gestures.push(extra);
     set

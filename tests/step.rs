@@ -1,4 +1,4 @@
-//! The pure step: no allocation, the same bits again, inside the limits whatever comes in, calm when poses are lost.
+//! The pure step: no allocation, the same bits again, inside the limits whatever comes in.
 
 mod support;
 

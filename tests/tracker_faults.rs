@@ -180,6 +180,22 @@ proptest! {
 }
 
 #[test]
+fn recordings_of_real_hands_are_left_alone() {
+    let configs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    let set = GestureSet::load(&configs.join("gestures/hand.toml")).expect("bundled");
+    for name in ["waiting.csv", "splay.csv", "drum_and_splay.jsonl"] {
+        let file = configs.join("performances").join(name);
+        let recording = Recording::read(&file).expect("bundled").0;
+        let options = FrontEndOptions::default();
+        let mut front = FrontEnd::new(&set, &recording.header, options).expect("match");
+        for sample in &recording.samples {
+            front.push(sample).expect("good sample");
+        }
+        assert_eq!(front.tracking(), TrackingCounts::default(), "{name}");
+    }
+}
+
+#[test]
 fn a_step_is_an_outlier_for_two_samples_at_most() {
     let set = wave_set(Path::Loop);
     for rate_hz in [20.0, 60.0, 120.0] {

@@ -130,6 +130,9 @@ fn info(file: &Path, json: bool) -> Result<ExitStatus, Failure> {
     let points: Vec<PointInfo> = (0..recording.header.points.len())
         .map(|index| PointInfo::of(&recording, index))
         .collect();
+    let channels: Vec<ChannelInfo> = (0..recording.header.channels.len())
+        .map(|index| ChannelInfo::of(&recording, index))
+        .collect();
     if json {
         let object = serde_json::json!({
             "file": file.display().to_string(),
@@ -139,6 +142,7 @@ fn info(file: &Path, json: bool) -> Result<ExitStatus, Failure> {
             "step_ms": {"min": step(0.0), "median": step(0.5), "max": step(1.0)},
             "points": points.iter().map(PointInfo::json).collect::<Vec<_>>(),
             "channels": recording.header.channels,
+            "channel_values": channels.iter().map(ChannelInfo::json).collect::<Vec<_>>(),
             "dropped": dropped.by_reason().into_iter().collect::<BTreeMap<_, _>>(),
         });
         say(format_args!("{object}"));
@@ -169,13 +173,59 @@ fn info(file: &Path, json: bool) -> Result<ExitStatus, Failure> {
             100.0 * point.seen
         ));
     }
-    if !recording.header.channels.is_empty() {
+    if !channels.is_empty() {
         say(format_args!(
-            "channels: {}",
-            recording.header.channels.join(", ")
+            "{:<20} {:>6}  {:>8} {:>8} {:>8}",
+            "channel", "seen", "mean", "least", "most"
+        ));
+    }
+    for channel in &channels {
+        say(format_args!(
+            "{:<20} {:>5.1}%  {:>8.3} {:>8.3} {:>8.3}",
+            channel.name,
+            100.0 * channel.seen,
+            channel.mean,
+            channel.least,
+            channel.most
         ));
     }
     Ok(ExitStatus::Done)
+}
+
+struct ChannelInfo {
+    name: String,
+    seen: f64,
+    mean: f64,
+    least: f64,
+    most: f64,
+}
+
+impl ChannelInfo {
+    fn of(recording: &Recording, index: usize) -> Self {
+        let samples = recording.samples.iter();
+        let values: Vec<f64> = samples
+            .filter_map(|s| s.channels.get(index).copied().flatten())
+            .collect();
+        let count = values.len().max(1) as f64;
+        let bound = |start: f64, of: fn(f64, f64) -> f64| {
+            let found = values.iter().copied().fold(start, of);
+            if values.is_empty() { 0.0 } else { found }
+        };
+        Self {
+            name: recording.header.channels[index].clone(),
+            seen: values.len() as f64 / recording.samples.len().max(1) as f64,
+            mean: values.iter().sum::<f64>() / count,
+            least: bound(f64::INFINITY, f64::min),
+            most: bound(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
+    fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "name": self.name, "seen": self.seen, "mean": self.mean,
+            "min": self.least, "max": self.most,
+        })
+    }
 }
 
 struct PointInfo {

@@ -114,13 +114,10 @@ fn tracking_lines(report: &Report) -> String {
     let mended = &report.tracking;
     let mut text = String::new();
     if *mended != TrackingCounts::default() {
-        text += &format!(
-            "tracker       {} points rejected, {} filled in, left and right put back in {} samples\n",
-            mended.outliers, mended.filled, mended.swapped
-        );
+        text += &format!("tracker       {mended}\n");
     }
     match report.performer_scale {
-        Some(scale) if scale == 1.0 => {}
+        Some(1.0) => {}
         Some(scale) => text += &format!("performer     scale {scale:.3}\n"),
         None => {
             text += "performer     scale never measured: no still second with all points seen; declare it with --scale NUMBER\n";

@@ -1,4 +1,4 @@
-//! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`.
+//! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`, `[[channel]]` in `configs/face.toml`.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -308,3 +308,36 @@ pub(super) fn layer_parts(
         clip,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_neighbourhood_reaches_two_edges_far_in_both_directions() {
+        let class = |gesture: usize| ClassParts {
+            name: gesture.to_string(),
+            gesture,
+            examples: Vec::new(),
+        };
+        // A chain of five classes, driven by gestures 4 to 0; gesture 5 drives none.
+        let classes: Vec<ClassParts> = (0..5).rev().map(class).collect();
+        let chain = [(0, 1), (1, 2), (3, 2), (4, 3)];
+        assert_eq!(
+            neighbourhoods(&chain, &classes, 6),
+            [
+                vec![2, 3, 4, 5],
+                vec![1, 2, 3, 4, 5],
+                vec![0, 1, 2, 3, 4, 5],
+                vec![0, 1, 2, 3, 5],
+                vec![0, 1, 2, 5],
+            ]
+        );
+        let all = (0..5).flat_map(|a| (0..5).map(move |b| (a, b)));
+        let everywhere = neighbourhoods(&all.collect::<Vec<_>>(), &classes, 6);
+        assert_eq!(everywhere, vec![vec![0, 1, 2, 3, 4, 5]; 5]);
+        // Two classes may share a gesture; a class without edges has its own alone.
+        let alone = neighbourhoods(&[], &[class(1), class(1), class(0)], 2);
+        assert_eq!(alone, [vec![1], vec![1], vec![0]]);
+    }
+}

@@ -8,7 +8,10 @@ use super::{
     FrontEnd, FrontEndError, FrontEndOptions, Gesture, GestureKind, GestureSet, References,
 };
 use crate::pose::PoseSample;
+use nalgebra::{DMatrix, DVector};
 
+/// What to do about gestures that are confused.
+const APART: &str = "make them differ more, or put them more than two edges apart";
 /// Speeds at which gestures are performed, in parts of the reference's.
 pub const SPEEDS: [f64; 3] = [0.5, 1.0, 1.5];
 /// Sizes at which gestures are performed, in parts of the reference's.
@@ -19,6 +22,10 @@ pub const STARTS: f64 = 0.2;
 const WEAK: f64 = 0.6;
 /// One that reads more than this of itself was not shown steadily.
 const UNEVEN: f64 = 1.15;
+/// A direction with less than this share of the largest one's energy is not a gesture's own.
+const LEAST_DIRECTION: f64 = 0.02;
+/// A gesture of which another one makes this share as well is its twin.
+const TWIN: f64 = 0.85;
 /// Samples per second of the performance.
 const RATE_HZ: f64 = 60.0;
 /// Periods that pass before a reading counts, and periods of reading.
@@ -71,6 +78,8 @@ pub struct Confusion {
     pub readings: Vec<Reading>,
     names: Vec<String>,
     kinds: Vec<GestureKind>,
+    /// Per gesture the share of its movement that each other one makes as well.
+    likeness: Vec<Vec<f64>>,
 }
 
 /// Root mean square movement per point of every gesture, metres, without global motion.
@@ -80,7 +89,7 @@ pub struct Confusion {
 pub fn sizes_m(set: &GestureSet) -> Result<Vec<f64>, String> {
     let references = References::new(set)?;
     let points = set.header.points.len().max(1) as f64;
-    let size = |(rows, mean): (&Vec<nalgebra::DVector<f64>>, &nalgebra::DVector<f64>)| {
+    let size = |(rows, mean): (&Vec<DVector<f64>>, &DVector<f64>)| {
         let sum: f64 = rows.iter().map(|row| (row - mean).norm_squared()).sum();
         (sum / (rows.len().max(1) as f64 * points)).sqrt()
     };
@@ -90,6 +99,49 @@ pub fn sizes_m(set: &GestureSet) -> Result<Vec<f64>, String> {
         .zip(&references.mean)
         .map(size)
         .collect())
+}
+
+/// Per gesture the share of its movement, 0 to 1, that lies in the directions in which each other one moves.
+///
+/// Estimators keep twins silent rather than start both: then nothing is read of either, and only this tells
+/// why.
+fn likeness(set: &GestureSet) -> Result<Vec<Vec<f64>>, String> {
+    let references = References::new(set)?;
+    let centred: Vec<DMatrix<f64>> = (references.local.iter().zip(&references.mean))
+        .map(|(rows, mean)| {
+            let rows: Vec<DVector<f64>> = rows.iter().map(|row| row - mean).collect();
+            DMatrix::from_columns(&rows)
+        })
+        .collect();
+    let directions: Vec<DMatrix<f64>> = centred
+        .iter()
+        .map(|frames| {
+            // Of the coordinates' covariance, which is small however many frames there are.
+            let eigen = (frames * frames.transpose()).symmetric_eigen();
+            let largest = eigen.eigenvalues.max();
+            let kept: Vec<DVector<f64>> = (eigen.eigenvectors.column_iter())
+                .zip(eigen.eigenvalues.iter())
+                .filter(|(_, value)| **value > LEAST_DIRECTION * largest)
+                .map(|(direction, _)| direction.into_owned())
+                .collect();
+            if kept.is_empty() {
+                DMatrix::zeros(frames.nrows(), 1)
+            } else {
+                DMatrix::from_columns(&kept)
+            }
+        })
+        .collect();
+    let share = |frames: &DMatrix<f64>, along: &DMatrix<f64>| {
+        let whole = frames.norm_squared().max(1e-300);
+        (along.transpose() * frames).norm_squared() / whole
+    };
+    let row = |frames| {
+        directions
+            .iter()
+            .map(|along| share(frames, along))
+            .collect()
+    };
+    Ok(centred.iter().map(row).collect())
 }
 
 /// Performs every gesture of `set` and reads all of them.
@@ -151,6 +203,7 @@ fn played(
         readings,
         names: set.gestures.iter().map(|g| g.name.clone()).collect(),
         kinds: set.gestures.iter().map(|g| g.kind).collect(),
+        likeness: likeness(set).map_err(|anchor| FrontEndError::Anchor { anchor })?,
     })
 }
 
@@ -282,17 +335,27 @@ impl Confusion {
                 |least, now| if now.1 < least.1 { now } else { least },
             );
         // Twins share what one alone would read: against a weak gesture a small answer is no small one.
-        let starts = STARTS.min(0.5 * own);
+        let starts = STARTS.min(0.5 * own).max(0.02);
         let confused: Vec<(usize, f64, f64)> = pairs
             .into_iter()
             .filter(|(_, there, back)| there.max(*back) > starts)
             .collect();
         let name = &self.names[gesture];
         let mut words = Vec::new();
-        let cause = if confused.is_empty() {
-            "show it larger and steadier"
-        } else {
-            "it shares its movement with others"
+        let twin = (others.clone())
+            .filter(|other| self.likeness[gesture][*other] > TWIN)
+            .max_by(|a, b| {
+                let like = |other: &usize| self.likeness[gesture][*other];
+                like(a).total_cmp(&like(b))
+            });
+        let cause = match twin {
+            Some(twin) => format!(
+                "`{}` makes {:.0} % of its movement as well; {APART}",
+                self.names[twin],
+                100.0 * self.likeness[gesture][twin]
+            ),
+            None if confused.is_empty() => "show it larger and steadier".into(),
+            None => "it shares its movement with others".into(),
         };
         if own < STARTS {
             words.push(format!(
@@ -313,13 +376,12 @@ impl Confusion {
         }
         for (other, there, back) in &confused {
             let other = &self.names[*other];
-            let advice = "make them differ more, or put them more than two edges apart";
             words.push(if there.min(*back) > starts {
-                format!("`{name}` and `{other}` answer to each other ({there:.2} and {back:.2}): {advice}")
+                format!("`{name}` and `{other}` answer to each other ({there:.2} and {back:.2}): {APART}")
             } else if there > back {
-                format!("`{other}` answers {there:.2} while `{name}` is performed: {advice}")
+                format!("`{other}` answers {there:.2} while `{name}` is performed: {APART}")
             } else {
-                format!("`{name}` answers {back:.2} while `{other}` is performed: {advice}")
+                format!("`{name}` answers {back:.2} while `{other}` is performed: {APART}")
             });
         }
         if words.is_empty() {

@@ -66,7 +66,8 @@ impl std::fmt::Debug for FrontEnd {
 }
 
 impl FrontEnd {
-    /// Trains the planes of `set` and matches its points to those of `stream` by name.
+    /// Trains the planes of `set` and matches its points to those of `stream` by name; to its
+    /// channels where it has no points ([`channel_as_point`]).
     ///
     /// # Errors
     /// No gesture, points the stream lacks, another dimension, options out of range.

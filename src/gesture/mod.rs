@@ -1,13 +1,15 @@
 //! Gestures: definition from one example, planes, wave estimators.
 //!
-//! The way of a pose: [`FrontEnd::push`] removes its global motion, every gesture's [`Plane`] maps
-//! what is left to one complex number (or a progression), and an [`Estimator`] reads amplitude,
-//! frequency and phase off that number's recent past. After Rhodin 2016, chapter 9.
+//! The way of a pose: [`FrontEnd::push`] mends what the tracker got wrong and removes the pose's
+//! global motion, every gesture's [`Plane`] maps what is left to one complex number (or a
+//! progression), and an [`Estimator`] reads amplitude, frequency and phase off that number's recent
+//! past. After Rhodin 2016, chapter 9.
 
 mod channel;
 mod confusion;
 mod define;
 mod file;
+mod foreign;
 mod frames;
 mod front;
 mod library;

@@ -13,11 +13,11 @@ const NEIGHBOURS: usize = 10;
 const LOOP_SPREAD: f64 = 0.3;
 /// Weight of every gesture's frames together in the regression, so that neither the tracker's rate
 /// nor a gesture's length decides how much it counts.
-const BLOCK_WEIGHT: f64 = 100.0;
+const BLOCK_WEIGHT: f64 = 1.0;
 /// Weight of the gesture's own mean pose, a rest pose where amplitude is zero.
-const REST_WEIGHT: f64 = 25.0;
-/// A component that explains less than this of its target is left as the regression gives it.
-const EXPLAINED: f64 = 0.5;
+const REST_WEIGHT: f64 = 0.25;
+/// Share of its target that a component must explain to count at all, and to be brought to full size.
+const EXPLAINED: (f64, f64) = (0.3, 0.65);
 
 /// The reference frames of a set without their global motion, ready for training.
 #[derive(Clone, Debug)]
@@ -28,8 +28,7 @@ pub struct References {
     pub local: Vec<Vec<DVector<f64>>>,
     /// Per gesture its mean pose over time.
     pub mean: Vec<DVector<f64>>,
-    /// Root mean square distance of a frame from its gesture's mean, over all gestures, metres:
-    /// divides poses so that one regularisation serves every tracker.
+    /// Root mean square distance of a frame from its gesture's mean, over all gestures, metres.
     pub scale_m: f64,
     /// How far any point gets from its mean place in a gesture, metres.
     pub reach_m: f64,
@@ -67,18 +66,12 @@ impl References {
                 ) / rows.len().max(1) as f64
             })
             .collect();
-        let (mut square, mut count) = (0.0, 0.0);
-        for (rows, mean) in local.iter().zip(&mean) {
-            for row in rows {
-                square += (row - mean).norm_squared() / rows.len() as f64;
-            }
-            count += 1.0;
-        }
-        let scale_m = if square > 0.0 {
-            (square / count).sqrt()
-        } else {
-            1.0
-        };
+        let sizes = local
+            .iter()
+            .zip(&mean)
+            .map(|(rows, mean)| size_of(rows, mean));
+        let square: f64 = sizes.map(|size| size * size).sum();
+        let scale_m = (square / local.len().max(1) as f64).sqrt();
         let mut reach_m = 0.0_f64;
         for (rows, mean) in local.iter().zip(&mean) {
             for row in rows {
@@ -98,6 +91,13 @@ impl References {
             reach_m,
         })
     }
+}
+
+/// Root mean square distance of the frames from their mean, metres; 1 where nothing moves.
+fn size_of(rows: &[DVector<f64>], mean: &DVector<f64>) -> f64 {
+    let square: f64 = rows.iter().map(|row| (row - mean).norm_squared()).sum();
+    let size = (square / rows.len().max(1) as f64).sqrt();
+    if size > 0.0 { size } else { 1.0 }
 }
 
 /// Target of frame `k` on the gesture's plane before the phase is shifted.
@@ -201,6 +201,7 @@ impl Plane {
         let own = targets(set, references, index);
         let mean = &references.mean[index];
         let dim = mean.len();
+        let scale_m = size_of(&references.local[index], mean);
         let mut inputs: Vec<(DVector<f64>, [f64; 2], f64)> = Vec::new();
         for (other, rows) in references.local.iter().enumerate() {
             if other != index && !competes(other) {
@@ -222,7 +223,7 @@ impl Plane {
         for (k, (pose, target, weight)) in inputs.iter().enumerate() {
             let root = weight.sqrt();
             for axis in 0..dim {
-                x[(k, axis)] = root * (pose[axis] - mean[axis]) / references.scale_m;
+                x[(k, axis)] = root * (pose[axis] - mean[axis]) / scale_m;
             }
             x[(k, dim)] = root;
             z[(k, 0)] = root * target[0];
@@ -240,9 +241,8 @@ impl Plane {
         .unwrap_or_else(|| DMatrix::zeros(dim + 1, 2));
         let mut plane = Self {
             kind: gesture.kind,
-            rows: [0, 1].map(|c| {
-                DVector::from_iterator(dim, (0..dim).map(|a| solution[(a, c)] / references.scale_m))
-            }),
+            rows: [0, 1]
+                .map(|c| DVector::from_iterator(dim, (0..dim).map(|a| solution[(a, c)] / scale_m))),
             bias: [0, 1].map(|c| solution[(dim, c)]),
             neighbours: Vec::new(),
             mean: mean.clone(),
@@ -271,7 +271,7 @@ impl Plane {
                 return;
             };
             let (rest, extreme) = (place(self, first)[0], place(self, last)[0]);
-            if extreme - rest > EXPLAINED {
+            if extreme - rest > EXPLAINED.0 {
                 let gain = 1.0 / (extreme - rest);
                 self.rows[0] *= gain;
                 self.bias[0] = (self.bias[0] - rest) * gain;
@@ -285,10 +285,15 @@ impl Plane {
                 square += target[component] * target[component];
             }
             let explained = if square > 0.0 { product / square } else { 0.0 };
-            if explained > EXPLAINED {
-                self.rows[component] /= explained;
-                self.bias[component] /= explained;
-            }
+            let (least, enough) = EXPLAINED;
+            let gain = if explained >= enough {
+                1.0 / explained
+            } else {
+                // What the pose hardly tells is noise in any other performer: it fades out.
+                ((explained - least) / (enough - least)).max(0.0) / enough
+            };
+            self.rows[component] *= gain;
+            self.bias[component] *= gain;
         }
     }
 
@@ -330,7 +335,7 @@ impl Plane {
     pub fn apply(&self, pose: &[f64], with_variance: bool) -> PlanePoint {
         let mut point = PlanePoint {
             z: self.linear(pose),
-            variance: [1.0, 1.0],
+            ..PlanePoint::default()
         };
         if with_variance && !self.neighbours.is_empty() {
             let relative = pose.iter().zip(self.mean.iter()).map(|(v, m)| v - m);

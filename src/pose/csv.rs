@@ -10,8 +10,7 @@
 use super::json::{HeaderFault, check_names, shown};
 use super::{PoseHeader, PoseSample, SampleFault};
 
-const EXAMPLE: &str =
-    "t,NAME.x,NAME.y[,NAME.z],...[,ch.CHANNEL,...], all points with the same axes, channels last";
+const EXAMPLE: &str = "t,NAME.x,NAME.y[,NAME.z],...[,ch.CHANNEL,...], all points with the same axes, channels last; other recordings come in with `handwave poses import`";
 
 /// Reads the header row.
 ///

@@ -53,6 +53,12 @@ impl ImportKind {
         })
     }
 
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        let named = Self::NAMED.iter().find(|(_, kind)| *kind == self);
+        named.map_or("", |(name, _)| name)
+    }
+
     /// What the content of a file looks like.
     pub fn detect(text: &str) -> Option<Self> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
@@ -80,7 +86,7 @@ impl ImportKind {
     }
 }
 
-/// How to read a recording; what does not belong to its kind is not looked at.
+/// How to read a recording; what does not belong to its kind is refused.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportOptions {
     /// The kind; detected from the content when not given.
@@ -99,6 +105,34 @@ pub struct ImportOptions {
     pub names: Vec<String>,
 }
 
+impl ImportOptions {
+    /// The flag of an option that is given and does not belong to `kind`, and the kinds it belongs to.
+    fn misplaced(&self, kind: ImportKind) -> Option<(&'static str, &'static str)> {
+        use ImportKind::{Bvh, Leap, LiveLinkFace, Table};
+        let all: [(bool, &str, &[ImportKind], &str); 6] = [
+            (self.joints, "--joints", &[Leap], "leap"),
+            (self.ends, "--ends", &[Bvh], "bvh"),
+            (
+                self.rotations,
+                "--rotations",
+                &[LiveLinkFace],
+                "live-link-face",
+            ),
+            (
+                self.unit.is_some(),
+                "--unit",
+                &[Bvh, Table],
+                "bvh and table",
+            ),
+            (self.rate_hz.is_some(), "--rate", &[Table], "table"),
+            (!self.names.is_empty(), "--names", &[Table], "table"),
+        ];
+        (all.into_iter())
+            .find(|(given, _, kinds, _)| *given && !kinds.contains(&kind))
+            .map(|(_, flag, _, belongs)| (flag, belongs))
+    }
+}
+
 /// A recording that was brought in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
@@ -113,8 +147,8 @@ pub struct Imported {
 /// Reads a recording of any known kind.
 ///
 /// # Errors
-/// Unreadable file, no known kind, a fault in it (with its line where it has lines), a table without
-/// a rate.
+/// Unreadable file, no known kind, an option of another kind, a fault in it (with its line where it
+/// has lines), a table without a rate.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, PoseError> {
     let file = path.display().to_string();
     let read = |source| PoseError::Read {
@@ -135,6 +169,12 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, PoseErro
             names.join(", ")
         ))
     })?;
+    if let Some((flag, belongs)) = options.misplaced(kind) {
+        return Err(wrong(format!(
+            "{flag} belongs to recordings of kind {belongs}; this one is read as {}",
+            kind.name()
+        )));
+    }
     let at = |fault: LineFault| fault.in_file(&file);
     let mut assumption = None;
     let recording = match kind {

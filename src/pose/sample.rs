@@ -18,7 +18,8 @@ pub struct PoseSample {
     pub t: f64,
     /// One position per point of the header, `None` where the tracker did not see it.
     pub points: Vec<Option<[f64; 3]>>,
-    /// Confidence per point, 0..1; empty when the tracker gives none.
+    /// Confidence per point, 0..1; empty when the tracker gives none. How far gestures believe a
+    /// point against what the others tell of it; below 0.1 it counts as not seen.
     pub confidence: Vec<f64>,
     /// One value per channel of the header, `None` where the sample carries none.
     pub channels: Vec<Option<f64>>,

@@ -3,7 +3,9 @@
 use super::load;
 use crate::base::suggest;
 use crate::cli::{ExitStatus, Failure, poses, warn};
-use crate::gesture::{EstimatorKind, FrontEnd, FrontEndOptions, GestureSet, PerformerScale};
+use crate::gesture::{
+    EstimatorKind, FrontEnd, FrontEndOptions, GestureSet, PerformerScale, TrackingCounts,
+};
 use crate::pose::Recording;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -47,6 +49,10 @@ pub(super) fn estimate(
             "{}: {refused} samples without estimate: too few points seen",
             poses.display()
         ));
+    }
+    let mended = front.tracking();
+    if mended != TrackingCounts::default() {
+        warn(format_args!("{}: {mended}", poses.display()));
     }
     match front.performer_scale() {
         None => warn(format_args!(

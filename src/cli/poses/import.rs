@@ -20,22 +20,26 @@ pub(super) const EXAMPLES: &str = "Examples:
   handwave poses import take.jsonl --points wrist,index_tip --out part.csv
 
 Kinds, told from the content (or by --kind):
-  bvh             BVH motion capture. Joints are points; rotations in the order of the channels; a position
-                  channel replaces the OFFSET. The unit is guessed from the skeleton's size unless --unit
-                  tells it; --ends adds the End Sites. A root that stays at the origin while the hips
-                  below it travel is left out.
-  live-link-face  Live Link Face CSV (time code at 60 per second). 52 blendshapes are channels named as in the
-                  file, 0..1; --rotations adds the angles of head and eyes, rad. The stream has no points.
-  a-frame         A-Frame motion capture JSON. Points head, left, right and, 0.1 m ahead of each, head_tip, ...
-  table           Lines of x,y,z of every point, divided by commas, semicolons, tabs or spaces; needs --rate.
-                  Points are p0, p1, ... or as --names says; metres or --unit.
-  leap            Leap Motion (LeapJS playback, decompressed JSON); --joints adds the fingers' joints.
-  poses           A pose stream (.jsonl, .csv): for --points and --as-points.
+  bvh             BVH motion capture; joints are points. Rotations in the order of the channels,
+                  a position channel replaces the OFFSET. The unit is guessed from the size of
+                  the skeleton unless --unit tells it. --ends adds the End Sites. A root that
+                  stays at the origin while the hips below it travel is left out.
+  live-link-face  Live Link Face CSV, time code at 60 per second; no points. 52 blendshapes are
+                  channels named as in the file, 0..1. --rotations adds head and eyes, rad.
+  a-frame         A-Frame motion capture JSON. Points head, left, right and, 0.1 m ahead of
+                  each, head_tip, left_tip, right_tip.
+  table           Lines of x,y,z of every point, divided by commas, semicolons, tabs or spaces;
+                  needs --rate. Points are p0, p1, ... or as --names says; metres or --unit.
+  leap            Leap Motion (LeapJS playback, decompressed JSON). --joints adds the joints
+                  of the fingers.
+  poses           A pose stream (.jsonl, .csv), for --points, --channels, --from, --to and
+                  --as-points.
 
---as-points makes points of channels, so that gestures can be defined over a face: point k stands still on the
-ground and moves up by 0.1 m as channel k goes from 0 to 1. It replaces the recording's own points; channels stay.
-Gestures defined over such points also read a stream of the channels alone, such as face.jsonl above.
-Times start at 0 and are seconds; lengths are metres, y up.";
+--as-points makes points of channels, so that gestures can be defined over a face: point k stands
+still on the ground and moves up by 0.1 m as channel k goes from 0 to 1. It replaces the points of
+the recording; channels stay. Gestures defined over such points also read a stream of the channels
+alone, such as face.jsonl above. Lengths are metres, y up; times seconds, from 0 where the
+recording was cut or had another clock.";
 
 /// A recording and how to read it.
 #[derive(Args, Debug)]

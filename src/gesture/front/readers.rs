@@ -1,6 +1,7 @@
 //! One reader per gesture and neighbourhood of the motion graph: its plane and what reads it.
 
 use crate::base::angle::wrap_tau;
+use crate::gesture::foreign::{Span, Trust};
 use crate::gesture::wave::ProgressionSmoother;
 use crate::gesture::{
     Estimator, EstimatorKind, GestureKind, GestureOptions, GestureSet, Plane, References,
@@ -37,7 +38,7 @@ impl GestureEstimate {
 }
 
 /// Two planes whose answers differ by less than this to every frame that either knows are one.
-const SAME_ANSWER: f64 = 0.02;
+const SAME_ANSWER: f64 = 0.05;
 
 /// How one gesture is read.
 enum Reading {
@@ -50,6 +51,7 @@ struct Reader {
     /// Gestures that its plane keeps apart from its own.
     known: Vec<usize>,
     plane: Plane,
+    trust: Trust,
     reading: Reading,
     estimate: GestureEstimate,
 }
@@ -62,6 +64,7 @@ struct Reader {
 /// kept warm, and going from node to node only changes which ones are listened to.
 pub(super) struct Readers {
     readers: Vec<Reader>,
+    span: Span,
     /// Per neighbourhood and gesture its reader; `None` where the gesture is out of reach.
     sets: Vec<Vec<Option<usize>>>,
     /// Neighbourhood of each node.
@@ -117,6 +120,12 @@ impl Readers {
                                 ProgressionSmoother::new(settings.progression_smoothing_s),
                             ),
                         },
+                        trust: Trust::new(
+                            references,
+                            *gesture,
+                            set.gestures[*gesture].duration_s,
+                            &plane,
+                        ),
                         plane,
                         estimate: GestureEstimate::silent(kind),
                     });
@@ -127,6 +136,7 @@ impl Readers {
         let kinds = set.gestures.iter().map(|gesture| gesture.kind);
         Self {
             readers,
+            span: Span::new(set, references),
             sets,
             set_of_node,
             active: 0,
@@ -137,11 +147,14 @@ impl Readers {
 
     /// Reads the flat pose at `t`, of which the share `seen` was seen.
     pub fn push(&mut self, t: f64, flat: &[f64], seen: f64) {
+        let outside = self.span.outside(flat);
         for reader in &mut self.readers {
             let (plane, estimate) = (&reader.plane, &mut reader.estimate);
             match &mut reader.reading {
                 Reading::Wave(estimator) => {
-                    estimator.push(t, plane.apply(flat, self.with_variance));
+                    let mut point = plane.apply(flat, self.with_variance);
+                    point.trust = reader.trust.push(t, outside, point.z);
+                    estimator.push(t, point);
                     let wave = estimator.estimate();
                     estimate.amplitude = wave.amplitude;
                     estimate.frequency_hz = wave.frequency_hz;
@@ -192,6 +205,7 @@ impl Readers {
     /// Forgets all samples; the neighbourhood stays.
     pub fn reset(&mut self) {
         for reader in &mut self.readers {
+            reader.trust.reset();
             match &mut reader.reading {
                 Reading::Wave(estimator) => estimator.reset(),
                 Reading::Progression(smoother) => smoother.reset(),

@@ -26,3 +26,13 @@ pub struct TrackingCounts {
     /// Points that were not seen (outliers included) or not trusted in full, and were filled in.
     pub filled: u64,
 }
+
+impl std::fmt::Display for TrackingCounts {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} points rejected, {} filled in, left and right put back in {} samples",
+            self.outliers, self.filled, self.swapped
+        )
+    }
+}

@@ -130,8 +130,8 @@ impl RestMeasure {
         }
         let since = self.since?;
         for (index, place) in places.iter().enumerate().filter(|(index, _)| seen[*index]) {
-            for axis in 0..3 {
-                self.sums[index][axis] += place[axis];
+            for (sum, value) in self.sums[index].iter_mut().zip(place) {
+                *sum += value;
             }
             self.counts[index] += 1.0;
         }

@@ -76,9 +76,9 @@ impl Track {
         }
         let ratio = step / step_before;
         let (mut stays, mut goes_on) = (0.0, 0.0);
-        for axis in 0..3 {
-            let moved = place[axis] - last.place[axis];
-            let expected = ratio * (last.place[axis] - before.place[axis]);
+        for ((now, last), before) in place.iter().zip(&last.place).zip(&before.place) {
+            let moved = now - last;
+            let expected = ratio * (last - before);
             stays += moved * moved;
             goes_on += (moved - expected) * (moved - expected);
         }

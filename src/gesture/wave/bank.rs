@@ -233,7 +233,7 @@ impl Bank {
 }
 
 /// Power by which the opposite sense must be better to be believed.
-pub(super) const SENSE_BIAS: f64 = 1.2;
+pub(super) const SENSE_BIAS: f64 = 2.0;
 
 #[cfg(test)]
 mod tests {

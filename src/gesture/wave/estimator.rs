@@ -13,13 +13,26 @@ use crate::gesture::GestureOptions;
 pub const LONGEST_GAP_S: f64 = 0.5;
 
 /// One pose on a gesture's plane.
-#[derive(Copy, Clone, Debug, Default, PartialEq)]
+#[derive(Copy, Clone, Debug, PartialEq)]
 pub struct PlanePoint {
     /// Place on the plane; the reference runs on the unit circle, counter-clockwise.
     pub z: [f64; 2],
     /// How little the pose tells about each component (average pairwise distance of the targets of
     /// the nearest reference frames); `[1, 1]` when nothing is known.
     pub variance: [f64; 2],
+    /// How far the motion on the plane is the gesture's own, 0..1: less where the gesture's points do
+    /// what no gesture does. Estimators may scale what they believe by it.
+    pub trust: f64,
+}
+
+impl Default for PlanePoint {
+    fn default() -> Self {
+        Self {
+            z: [0.0; 2],
+            variance: [1.0; 2],
+            trust: 1.0,
+        }
+    }
 }
 
 /// Amplitude, frequency and phase of one cyclic gesture.

@@ -35,6 +35,8 @@ struct Lock {
     since: f64,
     /// Centre believed in, once a whole period was seen.
     centre: Option<C>,
+    /// How far the performer's figure departs from the one that was shown.
+    bend: f64,
     /// Amplitude before the last cut.
     size: f64,
     /// The wave before the last cut, carried on to now.
@@ -55,6 +57,8 @@ pub struct FastEstimator {
     lambda: f64,
     lock: Option<Lock>,
     last_t: f64,
+    /// How far the last point's motion is the gesture's own.
+    trust: f64,
     /// How full the lock's window is, 0..1.
     full: f64,
     raw: WaveEstimate,
@@ -73,6 +77,7 @@ impl FastEstimator {
             lambda: options.lambda,
             lock: None,
             last_t: 0.0,
+            trust: 1.0,
             full: 0.0,
             raw: WaveEstimate::default(),
             out: WaveEstimate::default(),
@@ -134,7 +139,7 @@ impl FastEstimator {
         let size = lock.size.max(0.05);
         Prior {
             a: 0.5 + 2.0 * size,
-            b: 0.1 * size,
+            b: 0.1 * size + 1.5 * lock.bend,
             c: lock.centre.map(|_| 0.06 * size),
             omega,
         }
@@ -289,6 +294,7 @@ impl FastEstimator {
             learnt: 0.0,
             since: t - since_s,
             centre: None,
+            bend: 0.0,
             size: fit.wave.a.norm(),
             before: fit.wave,
             share: 0.0,
@@ -352,11 +358,12 @@ impl FastEstimator {
             lock.learnt += periods;
             let centre = lock.centre.get_or_insert(fit.wave.c);
             *centre += (fit.wave.c - *centre) * periods.min(1.0);
+            lock.bend += (fit.wave.b.norm() - lock.bend) * periods.min(1.0);
             let size = fit.wave.a.norm();
             lock.size += (size - lock.size) * periods.min(1.0);
         }
         self.full = (since_s * hz.abs() / (2.0 * self.lambda)).min(1.0);
-        let mut share = gate(explained, fit.evidence()) * sure(&fit);
+        let mut share = self.trust * gate(explained, fit.evidence()) * sure(&fit);
         if lock.centre.is_none() {
             share *= self.seen(since_s.min(self.history.covered_s()) * hz.abs());
         }
@@ -461,6 +468,7 @@ impl Estimator for FastEstimator {
             self.last_t = t;
         }
         let dt = t - self.last_t;
+        self.trust = point.trust;
         let z = C::new(point.z[0], point.z[1]);
         self.slow.push(t, z);
         self.quick.push(t, z);

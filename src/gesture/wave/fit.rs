@@ -92,6 +92,8 @@ pub(super) struct Fit {
     pub energy: f64,
     /// Standard deviation of the amplitude.
     pub deviation: f64,
+    /// Components in which the figure moves: 1 for a line, 2 for a circle.
+    pub components: f64,
     /// What data and beliefs together hold against this fit, in variances: smaller is likelier.
     pub cost: f64,
 }
@@ -109,7 +111,7 @@ impl Fit {
     /// How much likelier wave and constant are than a constant alone: the logarithm of the ratio, for
     /// Gaussian noise of unknown size.
     pub fn evidence(&self) -> f64 {
-        let free = 2.0 * self.count - UNKNOWNS as f64;
+        let free = self.components * (self.count - 0.5 * UNKNOWNS as f64);
         -0.5 * free.max(0.0) * (1.0 - self.explained()).max(1e-12).ln()
     }
 }
@@ -241,6 +243,7 @@ impl Task<'_> {
             residual,
             energy,
             deviation,
+            components: 1.0 + self.shape.roundness(),
         })
     }
 
