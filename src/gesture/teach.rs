@@ -360,7 +360,7 @@ impl Teacher {
                 // Several periods tell their length better than a hand on a key; one is as marked.
                 match motion.period().filter(|p| motion.spans(p, search::EARLY)) {
                     Some(_) => self.conclude(since, motion.period()),
-                    None => Ok(with_end(&self.set, &recording, name, source, since, end_s)?),
+                    None => Ok(with_end(&self.set, recording, name, source, since, end_s)?),
                 }
             }
         }
@@ -409,7 +409,7 @@ impl Teacher {
         };
         let (name, source) = (&self.options.name, &self.options.source);
         Ok(with_period(
-            &self.set, &recording, name, source, start_s, period,
+            &self.set, recording, name, source, start_s, period,
         )?)
     }
 
