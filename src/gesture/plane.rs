@@ -13,9 +13,11 @@ const NEIGHBOURS: usize = 10;
 const LOOP_SPREAD: f64 = 0.3;
 /// Weight of every gesture's frames together in the regression, so that neither the tracker's rate
 /// nor a gesture's length decides how much it counts.
-const BLOCK_WEIGHT: f64 = 1.0;
+const BLOCK_WEIGHT: f64 = 100.0;
+/// Share of a gesture's energy below which a direction of movement is not relied on.
+const FAINT: f64 = 0.02;
 /// Weight of the gesture's own mean pose, a rest pose where amplitude is zero.
-const REST_WEIGHT: f64 = 0.25;
+const REST_WEIGHT: f64 = 25.0;
 /// Share of its target that a component must explain to count at all, and to be brought to full size.
 const EXPLAINED: (f64, f64) = (0.3, 0.65);
 
@@ -91,6 +93,30 @@ impl References {
             reach_m,
         })
     }
+}
+
+/// Ridge regression of `z` on `x` (rows are weighted samples), by singular values.
+///
+/// Beside the ridge of eq. 9.2, a direction fades out in which the pose moves by less than
+/// [`FAINT`] of the gesture's energy: the regression would blow it up to tell the phase by it, and
+/// another performer, or the same one tomorrow, moves differently there.
+fn solve(x: DMatrix<f64>, z: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
+    let (dim, faint) = (x.ncols(), FAINT * BLOCK_WEIGHT);
+    let svd = x.svd(true, true);
+    let (Some(u), Some(v)) = (svd.u, svd.v_t) else {
+        return DMatrix::zeros(dim, 2);
+    };
+    let mut onto = u.transpose() * z;
+    for (k, value) in svd.singular_values.iter().enumerate() {
+        let square = value * value;
+        let gain = if square > 1e-12 {
+            value / (square + ridge + faint * faint / square)
+        } else {
+            0.0
+        };
+        onto.row_mut(k).scale_mut(gain);
+    }
+    v.transpose() * onto
 }
 
 /// Root mean square distance of the frames from their mean, metres; 1 where nothing moves.
@@ -181,9 +207,9 @@ impl Plane {
     /// Trains the map of gesture `index`: its frames run once round the unit circle (or from 0 to 1),
     /// all frames of the other gestures and the mean pose map to zero.
     ///
-    /// Ridge regression with a bias; normal equations or their dual, whichever is smaller. A last
-    /// step divides each component by the share the regression explains, so that the reference
-    /// itself measures amplitude 1; a non-cyclic map is brought to exactly 0 and 1 at its marks.
+    /// Ridge regression with a bias ([`solve`]). A last step divides each component by the share the
+    /// regression explains, so that the reference itself measures amplitude 1, and drops one that it
+    /// hardly explains; a non-cyclic map is brought to exactly 0 and 1 at its marks.
     pub fn train(set: &GestureSet, references: &References, index: usize) -> Self {
         Self::train_among(set, references, index, |_| true)
     }
@@ -229,16 +255,7 @@ impl Plane {
             z[(k, 0)] = root * target[0];
             z[(k, 1)] = root * target[1];
         }
-        let ridge = set.options.ridge;
-        let solution = if dim < n {
-            let normal = x.transpose() * &x + DMatrix::identity(dim + 1, dim + 1) * ridge;
-            normal.cholesky().map(|c| c.solve(&(x.transpose() * &z)))
-        } else {
-            let dual = &x * x.transpose() + DMatrix::identity(n, n) * ridge;
-            dual.cholesky().map(|c| x.transpose() * c.solve(&z))
-        }
-        // With ridge > 0 and finite input both matrices are positive definite.
-        .unwrap_or_else(|| DMatrix::zeros(dim + 1, 2));
+        let solution = solve(x, &z, set.options.ridge);
         let mut plane = Self {
             kind: gesture.kind,
             rows: [0, 1]

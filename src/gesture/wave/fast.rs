@@ -22,13 +22,28 @@ const LINES: usize = 28;
 /// Window of the quick bank, periods.
 const QUICK_LAMBDA: f64 = 0.3;
 
+/// What a wave leaves of the newest past.
+#[derive(Copy, Clone, Debug, Default)]
+struct Left {
+    /// Mean square, both components.
+    square: f64,
+    /// The part of it that changes from sample to sample: half the mean square of the changes.
+    white: f64,
+    /// Samples.
+    count: f64,
+}
+
 /// A wave being followed.
 #[derive(Copy, Clone, Debug)]
 struct Lock {
     /// As of the last sample.
     wave: Wave,
-    /// Usual mean square of what is left, both components.
+    /// Usual mean square of what is left, both components,
     noise: f64,
+    /// and the part of it that changes from sample to sample.
+    white: f64,
+    /// Samples in a period.
+    rate: f64,
     /// Periods over which the noise was learnt.
     learnt: f64,
     /// The window ends here (time).
@@ -112,19 +127,27 @@ impl FastEstimator {
             .sum()
     }
 
-    /// Mean square of what `wave` leaves of the newest third of a period, and samples there.
-    fn recent(&self, wave: &Wave, since_s: f64) -> (f64, f64) {
+    /// What `wave` leaves of the newest third of a period.
+    fn recent(&self, wave: &Wave, since_s: f64) -> Left {
         let reach = (RECENT * TAU / wave.omega.abs()).min(since_s);
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut left = Left::default();
+        let mut newer: Option<C> = None;
         for sample in self.history.samples() {
-            if sample.lag_s > reach && (count >= LEAST_RECENT || sample.lag_s > since_s) {
+            if sample.lag_s > reach && (left.count >= LEAST_RECENT || sample.lag_s > since_s) {
                 break;
             }
             let z = C::new(sample.z[0], sample.z[1]);
-            sum += (z - wave.at(&self.shape, sample.lag_s)).norm_sqr();
-            count += 1.0;
+            let rest = z - wave.at(&self.shape, sample.lag_s);
+            left.square += rest.norm_sqr();
+            if let Some(newer) = newer {
+                left.white += 0.5 * (newer - rest).norm_sqr();
+            }
+            newer = Some(rest);
+            left.count += 1.0;
         }
-        (sum / f64::max(count, 1.0), count)
+        left.square /= f64::max(left.count, 1.0);
+        left.white /= f64::max(left.count - 1.0, 1.0);
+        left
     }
 
     /// Share of a first amplitude that is believed after so many periods: a line must have been there and
@@ -148,7 +171,11 @@ impl FastEstimator {
     fn variance(&self, lock: &Lock) -> f64 {
         // On a line nearly all noise lies in the one component that the pose tells.
         let lean = 1.0 - 0.5 * self.shape.roundness();
-        lean * lock.noise + (FLOOR * lock.size).powi(2)
+        // What is left and hangs together from sample to sample (harmonics, a hand's own way) tells
+        // less than its samples are many.
+        let white = lock.white.min(lock.noise);
+        let tied = (lock.noise - 1.3 * white).max(0.0) * (lock.rate * TIED).max(1.0);
+        lean * (white.max(lock.noise.min(1.3 * white)) + tied) + (FLOOR * lock.size).powi(2)
     }
 
     /// Fits the lock's wave to now; cuts the past off where it no longer fits.
@@ -167,9 +194,9 @@ impl FastEstimator {
         lock.before = lock.before.ahead(dt);
         let period = TAU / start.omega.abs();
         let short = since_s < SHORT * period;
-        let (left, count) = self.recent(&fit.wave, since_s);
+        let left = self.recent(&fit.wave, since_s);
         let usual = lock.noise + (FLOOR * lock.size).powi(2);
-        let surprised = left > (1.0 + SURPRISE / count.sqrt()) * usual;
+        let surprised = left.square > (1.0 + SURPRISE / left.count.sqrt()) * usual;
         if !short && surprised && lock.learnt > LEARNT {
             // Is there a wave that explains the newest past much better than the old one does?
             let mut fresh = lock;
@@ -291,6 +318,8 @@ impl FastEstimator {
         let lock = Lock {
             wave: fit.wave,
             noise: fit.residual,
+            white: fit.residual,
+            rate: 1.0,
             learnt: 0.0,
             since: t - since_s,
             centre: None,
@@ -328,6 +357,7 @@ impl FastEstimator {
                     Some((old, held_fit)) if fit.evidence() > held_fit.evidence() + 2.0 => {
                         lock.share = old.share;
                         lock.noise = lock.noise.max(old.noise);
+                        lock.white = lock.noise;
                         held = Some((lock, fit));
                     }
                     Some(_) => {}
@@ -348,13 +378,15 @@ impl FastEstimator {
         let explained = fit.explained();
         if since_s * hz.abs() > 0.8 {
             let pace = (periods / lock.learnt.clamp(0.3, 1.0)).min(1.0);
-            let (left, _) = self.recent(&fit.wave, since_s);
-            let left = left.min(if lock.learnt > LEARNT {
+            let left = self.recent(&fit.wave, since_s);
+            let most = if lock.learnt > LEARNT {
                 3.0 * lock.noise + 1e-6
             } else {
                 f64::INFINITY
-            });
-            lock.noise += pace * (left - lock.noise);
+            };
+            lock.noise += pace * (left.square.min(most) - lock.noise);
+            lock.white += pace * (left.white.min(most) - lock.white);
+            lock.rate = 1.0 / (hz.abs() * self.history.step_s()).max(1e-3);
             lock.learnt += periods;
             let centre = lock.centre.get_or_insert(fit.wave.c);
             *centre += (fit.wave.c - *centre) * periods.min(1.0);
@@ -449,6 +481,8 @@ const DOUBT: [f64; 2] = [0.5, 1.2];
 const SURPRISE: f64 = 2.5;
 /// By how much a new wave must fit better than the old one, in variances, to be a change.
 const PROOF: f64 = 45.0;
+/// How long what is left hangs together, periods.
+const TIED: f64 = 0.125;
 /// Departures from the wave that are never a surprise, as a share of the amplitude.
 const FLOOR: f64 = 0.02;
 /// Time constant of amplitude and frequency with a short window and with a full one, seconds.
