@@ -105,6 +105,14 @@ impl Player {
         self.puppet.stage() != Stage::Done
     }
 
+    /// The samples of the last two cycles, into `out`.
+    pub fn due(&self, out: &mut Vec<PoseSample>) {
+        out.clear();
+        let since_s = self.t_s() - 2.5 / RATE_HZ;
+        let given = self.samples[..self.next].iter();
+        out.extend(given.filter(|s| s.t > since_s).cloned());
+    }
+
     pub fn positions(&self) -> &[f64] {
         &self.puppet.targets().positions
     }
