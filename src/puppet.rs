@@ -123,6 +123,28 @@ pub struct Puppet {
     targets: Targets,
 }
 
+/// Gestures with all that a puppet needs to go by them: made anywhere, taken over in a cycle.
+#[derive(Debug)]
+pub struct Gestures {
+    /// Reads the gestures.
+    pub front: FrontEnd,
+    gesture_of_class: Vec<Option<usize>>,
+    estimates: Vec<GestureEstimate>,
+    channels: Vec<f64>,
+}
+
+impl Gestures {
+    /// `gesture_of_class`: per class of the animator the index of its gesture in `front`.
+    pub fn new(front: FrontEnd, gesture_of_class: Vec<Option<usize>>) -> Self {
+        Self {
+            estimates: front.estimates().to_vec(),
+            channels: vec![f64::NAN; front.channel_names().len()],
+            front,
+            gesture_of_class,
+        }
+    }
+}
+
 /// An eased way between two poses.
 #[derive(Clone, Debug, Default)]
 struct Ramp {
@@ -242,6 +264,32 @@ impl Puppet {
         self.targets.held_back = self.envelope.pass(&self.pose, &mut self.targets.positions);
         self.targets.stage = self.stage;
         &self.targets
+    }
+
+    /// Goes by other gestures from now on; `other` then holds the old ones. False, and nothing changed, when
+    /// they are for another number of classes.
+    ///
+    /// The animator keeps its state, so the motion goes on: amplitude, tempo and phase are drawn to the new
+    /// estimates as they are to any. Shown the same past, new gestures that are like the old ones read alike.
+    /// Allocates and frees nothing.
+    pub fn swap_gestures(&mut self, other: &mut Gestures) -> bool {
+        if other.gesture_of_class.len() != self.class_inputs.len() {
+            return false;
+        }
+        std::mem::swap(&mut self.front, &mut other.front);
+        for (input, gesture) in self
+            .class_inputs
+            .iter_mut()
+            .zip(&mut other.gesture_of_class)
+        {
+            std::mem::swap(&mut input.gesture, gesture);
+        }
+        std::mem::swap(&mut self.estimates, &mut other.estimates);
+        std::mem::swap(&mut self.channels, &mut other.channels);
+        for join in &mut self.joins {
+            join.expect_a_jump();
+        }
+        true
     }
 
     /// Drives the animator from the gestures; `share` 0 releases them.

@@ -135,6 +135,8 @@ fn after_a_pause_of_the_machine_no_goal_jumps() {
             bus: wire.bus,
             reader,
             first,
+            live: None,
+            reload: None,
             stop: StopSwitch::new(),
             options: session::control_options(&character, RATE_HZ, Some(18.0)),
             on_start: Box::new(|_| {}),

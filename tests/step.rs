@@ -1,5 +1,4 @@
 //! The pure step: no allocation, the same bits again, inside the limits whatever comes in.
-#![allow(unsafe_code, reason = "a global allocator that counts")]
 
 mod support;
 
@@ -9,47 +8,12 @@ use handwave::live::session;
 use handwave::pose::PoseSample;
 use handwave::puppet::Inputs;
 use handwave::sim::fault::Chance;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use support::character::{Player, RATE_HZ, performance, shipped};
+use support::counting::{Counting, allocations};
 use support::limits::LimitWatch;
-
-/// Counts the allocations of each thread.
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-fn count() {
-    // Not counted while the thread ends.
-    let _ = ALLOCATIONS.try_with(|n| n.set(n.get() + 1));
-}
-
-// SAFETY: hands everything to the system's allocator and only counts beside it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: as above.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
-
-fn allocations() -> u64 {
-    ALLOCATIONS.with(Cell::get)
-}
 
 #[test]
 fn whole_performances_allocate_nothing_and_repeat_bit_for_bit() {

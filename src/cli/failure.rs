@@ -1,5 +1,6 @@
 //! How a command ends: exit codes (a contract) and failures with a message for the reader.
 
+use crate::live::source::SourceError;
 use std::fmt;
 use std::process::ExitCode;
 
@@ -47,6 +48,18 @@ impl Failure {
         Self {
             status: ExitStatus::BusFailure,
             message: message.to_string(),
+        }
+    }
+}
+
+impl From<SourceError> for Failure {
+    fn from(error: SourceError) -> Self {
+        match error {
+            SourceError::Interrupted => Self {
+                status: ExitStatus::Interrupted,
+                message: error.to_string(),
+            },
+            other => Self::input(other),
         }
     }
 }

@@ -6,11 +6,12 @@ use super::{ExitStatus, Failure, say, warn};
 use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
 use crate::config::files::BUILT_IN;
-use crate::config::{self, Character, Files};
+use crate::config::{self, Character, Files, GestureFiles};
 use crate::gesture::PerformerScale;
 use crate::live::control::Ending;
+use crate::live::reload::News;
 use crate::live::session::{self, Observer, Report, Session};
-use crate::live::source::{self, SourceReader};
+use crate::live::source::{self, Source};
 use crate::live::wire::{self, WireError};
 use crate::live::{CycleRecord, RealClock, StopSwitch};
 use crate::sim::FaultSpec;
@@ -45,6 +46,8 @@ pub const EXAMPLES: &str = "Examples:
   handwave run                                        the built-in quadruped, simulated, with a recorded performer
   handwave run --bus dynamixel:/dev/ttyUSB0@1000000   the same on real servos
   handwave run my_robot.toml --input file:take3.jsonl
+  handwave run my_robot.toml --input udp://7000       live: pose-stream JSON, one object a datagram, header first
+  my_tracker | handwave run my_robot.toml --input -   live from a pipe (JSON Lines or CSV)
   handwave run --scale 1.5                            a small hand (its poses enlarged to the gestures' size)
   handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
@@ -55,7 +58,8 @@ Exit codes: 0 done, 2 bad usage, config or input, 3 bus failure, 4 safety stop, 
 /// Options of `handwave run`.
 #[derive(Args, Debug, Default)]
 pub struct RunOptions {
-    /// Pose source in place of the configuration's, such as file:take.jsonl
+    /// Pose source in place of the configuration's: file:take.jsonl, udp://[ADDRESS:]PORT (this machine
+    /// only without an address), - (standard input). A live one plays until Ctrl-C, --duration or its end
     #[arg(long, value_name = "SOURCE")]
     input: Option<String>,
     /// Size of the gestures' reference by the performer's (1.4: a child), or rest: measured over
@@ -84,6 +88,9 @@ pub struct RunOptions {
     /// (`handwave sim dynamixel --list-faults`)
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
+    /// Load changed gesture files while the run goes on (with live sources it does so by itself)
+    #[arg(long)]
+    watch: bool,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -138,12 +145,25 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             "--speed max would drive the servos on a real bus faster than real time; it works with --bus sim only",
         ));
     }
-    let reader = match &options.input {
-        Some(input) => source::open(input, &source::working_folder()),
-        None => source::open(&character.source, &character.files),
+    if let Some(input) = &options.input {
+        character.source.clone_from(input);
     }
-    .map_err(Failure::input)?;
-    if let Some(assumption) = reader.assumption() {
+    let live = source::is_live(&character.source);
+    if live && options.speed == Speed::Max {
+        return Err(Failure::input(format!(
+            "--speed max takes time from a recording; {} is live and has none to give: leave --speed out, or record it first",
+            character.source
+        )));
+    }
+    let stop = StopSwitch::new();
+    stop.on_signals()
+        .map_err(|e| Failure::input(format!("cannot listen for signals: {e}")))?;
+    let folder = match &options.input {
+        Some(_) => source::working_folder(),
+        None => character.files.clone(),
+    };
+    let source = source::open_any(&character.source, &folder, &stop)?;
+    if let Some(assumption) = source.reader.assumption() {
         warn(format_args!("{assumption}"));
     }
     let targets = options
@@ -157,19 +177,17 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
     if let Some(problem) = wire::too_slow(&character, &character.bus, rate_hz) {
         warn(format_args!("warning: {problem}"));
     }
-    let stop = StopSwitch::new();
-    stop.on_signals()
-        .map_err(|e| Failure::input(format!("cannot listen for signals: {e}")))?;
     let mut onlooker = Onlooker {
         targets,
         display: Display::Quiet,
         newest: CycleRecord::default(),
+        later: Vec::new(),
     };
     let report = match options.speed {
         Speed::Max => {
             let clock = VirtualClock::new();
             let shared: Arc<dyn Clock> = Arc::new(clock.clone());
-            let session = session(options, &character, rate_hz, reader, faults, shared, stop)?;
+            let session = session(options, &character, rate_hz, source, faults, shared, stop)?;
             session::run_virtual(session, &clock, &mut onlooker)
         }
         Speed::Real => {
@@ -181,7 +199,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
                 options,
                 &character,
                 rate_hz,
-                reader,
+                source,
                 faults,
                 Arc::clone(&clock),
                 stop,
@@ -191,6 +209,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             ran.map_err(Failure::input)?
         }
     };
+    for line in &onlooker.later {
+        warn(format_args!("{line}"));
+    }
     let written = onlooker.targets.map_or(Ok(()), TargetsFile::finish);
     conclude(options, report, written, &character)
 }
@@ -219,18 +240,41 @@ fn faults(options: &RunOptions, character: &Character) -> Result<Vec<FaultSpec>,
         .collect()
 }
 
+/// The gesture files to watch, if any: by --watch, by the configuration, or because the source is live.
+fn reload(
+    options: &RunOptions,
+    character: &Character,
+    live: bool,
+) -> Result<Option<GestureFiles>, Failure> {
+    let files = character.gesture_files();
+    if options.watch && !files.can_change() {
+        return Err(Failure::input(
+            "--watch: these gestures cannot change while they are played: those of the built-in quadruped are part of the program (copy configs/quadruped.toml and its parts, and run that), and a character with a pose map keeps its own",
+        ));
+    }
+    if options.watch && options.speed == Speed::Max {
+        return Err(Failure::input(
+            "--watch works by the clock; --speed max has none: leave one of them out",
+        ));
+    }
+    let wanted = options.watch || character.reload.unwrap_or(live);
+    Ok((wanted && files.can_change()).then_some(files))
+}
+
 /// Opens the bus and puts the session together.
 fn session(
     options: &RunOptions,
     character: &Character,
     rate_hz: f64,
-    mut reader: SourceReader,
+    mut source: Source,
     faults: Vec<FaultSpec>,
     clock: Arc<dyn Clock>,
     stop: StopSwitch,
 ) -> Result<Session<Box<dyn BufRead + Send>>, Failure> {
-    let first = source::first_sample(&mut reader).map_err(Failure::input)?;
-    let puppet = session::puppet(character, reader.header(), rate_hz).map_err(Failure::input)?;
+    let reload = reload(options, character, source.live.is_some())?;
+    let first = source.first_sample()?;
+    let puppet =
+        session::puppet(character, source.reader.header(), rate_hz).map_err(Failure::input)?;
     let wire = wire::open(character, &character.bus, clock, rate_hz).map_err(|e| match e {
         WireError::Port(_) => Failure::bus(e),
         other => Failure::input(other),
@@ -239,8 +283,10 @@ fn session(
     Ok(Session {
         puppet,
         bus: wire.bus,
-        reader,
+        reader: source.reader,
         first,
+        live: source.live,
+        reload,
         stop,
         options: session::control_options(character, rate_hz, options.duration),
         on_start: Box::new(move |start| {
@@ -310,6 +356,8 @@ struct Onlooker {
     targets: Option<TargetsFile>,
     display: Display,
     newest: CycleRecord,
+    /// What could not be said while the view had the terminal.
+    later: Vec<String>,
 }
 
 impl Observer for Onlooker {
@@ -323,5 +371,16 @@ impl Observer for Onlooker {
 
     fn tick(&mut self) {
         self.display.draw(&self.newest);
+    }
+
+    fn news(&mut self, news: &News) {
+        if let News::Gestures(names) = news {
+            self.display.rename_gestures(names);
+        }
+        if self.display.shares_the_terminal() {
+            warn(format_args!("{news}"));
+        } else {
+            self.later.push(news.to_string());
+        }
     }
 }

@@ -21,11 +21,7 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
             })
         })
         .collect();
-    let dropped: serde_json::Map<String, Value> = report
-        .dropped
-        .by_reason()
-        .into_iter()
-        .filter(|(_, n)| *n > 0)
+    let dropped: serde_json::Map<String, Value> = dropped(report)
         .map(|(reason, n)| (reason.into(), n.into()))
         .collect();
     json!({
@@ -84,7 +80,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         report.transitions.completed,
         report.transitions.aborted,
         stats.samples,
-        report.dropped.total() + report.refused,
+        report.dropped.total() + report.before_header + report.refused,
         reasons(report),
         stats.silent,
         stats.damaged,
@@ -198,12 +194,16 @@ fn fault_line<'a>(
     format!("fault         {who} {} {listed}{more}\n", kind.as_str())
 }
 
-fn reasons(report: &Report) -> String {
-    let list: Vec<String> = report
-        .dropped
-        .by_reason()
-        .into_iter()
+/// Why samples were dropped, and how many.
+fn dropped(report: &Report) -> impl Iterator<Item = (&'static str, u64)> {
+    let reasons = report.dropped.by_reason().into_iter();
+    reasons
+        .chain([("before_header", report.before_header)])
         .filter(|(_, n)| *n > 0)
+}
+
+fn reasons(report: &Report) -> String {
+    let list: Vec<String> = dropped(report)
         .map(|(reason, n)| format!("{n} {reason}"))
         .collect();
     if list.is_empty() {

@@ -2,8 +2,9 @@
 
 use super::channel::{self, ChannelParts, channel_parts};
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, OnExit, OnLost, OnServoFault};
+use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
+use super::gestures::{GestureFiles, Reader, merged};
 use super::motion::{
     ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts,
     neighbourhoods, read,
@@ -49,6 +50,8 @@ pub struct Character {
     pub gestures: GestureSet,
     /// How gestures are read.
     pub front_options: FrontEndOptions,
+    /// Whether changed gesture files are loaded while a run goes on; `None`: with live sources.
+    pub reload: Option<bool>,
     /// Envelope limits in model order.
     pub limits: Vec<JointEnvelope>,
     /// Class names with the gesture that drives each, in node order.
@@ -70,6 +73,8 @@ pub struct Character {
     graph: GraphParts,
     layers: Vec<LayerParts>,
     channels: Vec<ChannelParts>,
+    /// Paths of the gesture files, and what stood in them.
+    gesture_texts: (Vec<String>, Vec<String>),
 }
 
 /// Ramps and policies, checked.
@@ -110,7 +115,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let limits = envelope_limits(&file, &model);
     let servos = servo_map(&file, &model, &at)?;
     let ranges = joint_ranges(&limits);
-    let mut gestures = gesture_set(&files, &file, &at)?;
+    let (mut gestures, paths, texts) = gesture_set(&files, &file, &at)?;
     let classes = class_parts(&files, &file, &joints, &limits, &gestures, &at)?;
     if let (true, Some(map)) = (
         gestures.gestures.is_empty(),
@@ -176,16 +181,19 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     };
     let bus = file.bus.bus.parse().map_err(|e| at.key("bus.bus", e))?;
     let safety = &file.safety;
+    let front_options = FrontEndOptions {
+        estimator,
+        lambda: file.input.window,
+        scale: performer_scale(&file, &at)?,
+        ..FrontEndOptions::default()
+    };
     let character = Character {
         name: file.name.clone(),
         config_name: file_name.clone(),
         source: file.input.source.get_ref().clone(),
-        front_options: FrontEndOptions {
-            estimator,
-            lambda: file.input.window,
-            scale: performer_scale(&file, &at)?,
-            ..FrontEndOptions::default()
-        },
+        front_options,
+        gesture_texts: (paths, texts),
+        reload: file.input.reload,
         safety: Safety {
             ramp_s: safety.ramp_s,
             end_ramp_s: safety.end_ramp_s,
@@ -313,6 +321,22 @@ impl Character {
         neighbourhoods(&self.graph.1, &self.classes, self.gestures.gestures.len())
     }
 
+    /// The gesture files, to be read again when they change.
+    pub fn gesture_files(&self) -> GestureFiles {
+        GestureFiles::new(
+            &self.files,
+            self.gesture_texts.clone(),
+            &self.gestures,
+            Reader {
+                options: self.front_options,
+                edges: self.graph.1.clone(),
+                classes: self.classes.clone(),
+                channels: self.channels.clone(),
+                config_name: self.config_name.clone(),
+            },
+        )
+    }
+
     /// Names of the layers, in order.
     pub fn layer_names(&self) -> Vec<String> {
         self.layers.iter().map(|l| l.name.clone()).collect()
@@ -408,32 +432,27 @@ fn envelope_limits(file: &CharacterFile, model: &RobotModel) -> Vec<JointEnvelop
         .collect()
 }
 
+/// All gesture files as one set, with their paths and texts.
 fn gesture_set(
     files: &Files,
     file: &CharacterFile,
     at: &Pointer<'_>,
-) -> Result<GestureSet, ConfigError> {
-    let entry = match file.gesture.as_slice() {
-        [entry] => entry,
-        [] if file.class.iter().any(|c| c.map.is_some()) => {
-            let header = PoseHeader {
-                points: Vec::new(),
-                dim: 3,
-                channels: Vec::new(),
-            };
-            return Ok(GestureSet::new(&header, Vec::new()));
-        }
-        other => {
-            return Err(at.key(
-                "gesture",
-                format!(
-                    "{} gesture files are named; give one [[gesture]] file, which may define many gestures (only a character with a class with `map` may be without)",
-                    other.len()
-                ),
-            ));
-        }
-    };
-    let text = read(files, &entry.file, "gesture.file", at)?;
-    GestureSet::from_toml(&text, &files.name(entry.file.get_ref()))
-        .map_err(|e| at.at(entry.file.span(), "gesture.file", e))
+) -> Result<(GestureSet, Vec<String>, Vec<String>), ConfigError> {
+    let entries = &file.gesture;
+    if entries.is_empty() && file.class.iter().any(|c| c.map.is_some()) {
+        let header = PoseHeader {
+            points: Vec::new(),
+            dim: 3,
+            channels: Vec::new(),
+        };
+        return Ok((GestureSet::new(&header, Vec::new()), Vec::new(), Vec::new()));
+    }
+    let text = |entry: &GestureEntry| read(files, &entry.file, "gesture.file", at);
+    let texts = entries.iter().map(text).collect::<Result<Vec<_>, _>>()?;
+    let path = |entry: &GestureEntry| entry.file.get_ref().clone();
+    let paths: Vec<String> = entries.iter().map(path).collect();
+    let set = merged(files, &paths, &texts)
+        .map_err(|bad| at.at(entries[bad.index].file.span(), "gesture.file", bad.problem))?;
+    let none = "no gesture file; give [[gesture]] file = \"gestures/hand.toml\" (only a character with a class with `map` may be without)";
+    Ok((set.ok_or_else(|| at.key("gesture", none))?, paths, texts))
 }

@@ -43,7 +43,7 @@ pub struct CharacterFile {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
-    /// `file:PATH`.
+    /// `file:PATH`, `udp://[ADDRESS:]PORT` or `-`.
     pub source: Spanned<String>,
     /// Estimator of waves.
     #[serde(default)]
@@ -51,6 +51,9 @@ pub struct Input {
     /// Window of the wave filters in periods.
     #[serde(default)]
     pub window: Option<f64>,
+    /// Changed gesture files are loaded while a run goes on.
+    #[serde(default)]
+    pub reload: Option<bool>,
     /// Size of the gestures' reference by the performer's: a number, or `"rest"`.
     #[serde(default)]
     pub scale: Option<Spanned<toml::Value>>,

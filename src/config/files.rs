@@ -1,6 +1,7 @@
 //! Where the files that a configuration names are read from.
 
 use super::error::ConfigError;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// A place with a character's files.
@@ -10,6 +11,17 @@ pub enum Files {
     Folder(PathBuf),
     /// The files of the built-in quadruped, part of the program.
     Embedded,
+}
+
+/// What changes when a file does.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub struct FileStamp {
+    /// Time of the last change, nanoseconds.
+    modified_ns: i64,
+    /// Another file of the same name has another number.
+    inode: u64,
+    /// Length.
+    bytes: u64,
 }
 
 /// The built-in character's configuration.
@@ -55,6 +67,21 @@ impl Files {
                 .find(|(name, _)| *name == path)
                 .map(|(_, text)| (*text).to_string())
                 .ok_or_else(|| cannot("is not one of the built-in files".into())),
+        }
+    }
+
+    /// When the file at `path` was last changed and how long it is; `None` where that cannot be told.
+    pub fn stamp(&self, path: &str) -> Option<FileStamp> {
+        match self {
+            Files::Folder(folder) => {
+                let about = std::fs::metadata(folder.join(path)).ok()?;
+                Some(FileStamp {
+                    modified_ns: about.mtime().checked_mul(1_000_000_000)? + about.mtime_nsec(),
+                    inode: about.ino(),
+                    bytes: about.len(),
+                })
+            }
+            Files::Embedded => None,
         }
     }
 

@@ -1,18 +1,16 @@
 //! A gesture from one example and its marks (Rhodin 2016, section 9.3).
 
-use super::period::find_period;
+use super::frames::{distance, frames_of, local_of, resampled, spread};
+use super::period::{PeriodEstimate, find_period};
 use super::{Gesture, GestureKind, GestureSet};
-use crate::pose::{GlobalFit, Recording};
+use crate::pose::Recording;
 
 /// Autocorrelation below which a motion has no period worth the name.
 const PERIODIC: f64 = 0.5;
-/// Longest stretch after the start mark that is looked at, in seconds: several of the longest
-/// periods.
-const STRETCH_S: f64 = 20.0;
 /// Half width of the stretch that is compared when looking for the end, in periods.
 const COMPARED: f64 = 0.15;
 /// A gesture needs this many frames.
-const FEWEST_FRAMES: usize = 4;
+pub(super) const FEWEST_FRAMES: usize = 4;
 /// The periods the estimators can follow, in seconds.
 const PERIODS_S: (f64, f64) = (1.0 / 6.0, 5.0);
 
@@ -138,38 +136,6 @@ pub enum DefineError {
     },
 }
 
-/// The recording's frames in the order of the set's points, gaps filled.
-fn frames_of(set: &GestureSet, recording: &Recording) -> Result<Vec<Vec<[f64; 3]>>, DefineError> {
-    if recording.header.points.is_empty() {
-        return Err(DefineError::NoPoints);
-    }
-    if recording.header.dim != set.header.dim {
-        return Err(DefineError::Dimension {
-            found: recording.header.dim,
-            expected: set.header.dim,
-        });
-    }
-    let filled = recording
-        .filled()
-        .map_err(|point| DefineError::NeverSeen { point })?;
-    let columns: Vec<usize> = set
-        .header
-        .points
-        .iter()
-        .map(|name| {
-            (recording.header.points.iter().position(|p| p == name)).ok_or_else(|| {
-                DefineError::MissingPoint {
-                    point: name.clone(),
-                }
-            })
-        })
-        .collect::<Result<_, _>>()?;
-    Ok(filled
-        .into_iter()
-        .map(|row| columns.iter().map(|column| row[*column]).collect())
-        .collect())
-}
-
 fn check_mark(recording: &Recording, mark: &'static str, found: f64) -> Result<(), DefineError> {
     let (from, to) = recording.span_s();
     // Half a millisecond of grace: marks are often typed as they were printed.
@@ -199,65 +165,6 @@ fn nearest(recording: &Recording, t: f64) -> usize {
     } else {
         after.min(recording.samples.len().saturating_sub(1))
     }
-}
-
-/// Poses without global motion, flat, fitted to the frame at `reference`.
-fn local_of(
-    set: &GestureSet,
-    frames: &[Vec<[f64; 3]>],
-    reference: usize,
-) -> Result<Vec<Vec<f64>>, DefineError> {
-    let home = frames.get(reference).map_or(&[][..], Vec::as_slice);
-    let fit = GlobalFit::new(&set.header, home, &set.global)
-        .map_err(|anchor| DefineError::Anchor { anchor })?;
-    let mut out = vec![[0.0; 3]; set.header.points.len()];
-    Ok(frames
-        .iter()
-        .map(|frame| {
-            fit.remove(frame, None, &mut out);
-            out.iter().flatten().copied().collect()
-        })
-        .collect())
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
-}
-
-/// The local poses at uniform steps from sample `from` on.
-fn resampled(recording: &Recording, local: &[Vec<f64>], from: usize, step: f64) -> Vec<Vec<f64>> {
-    let start = recording.samples[from].t;
-    let end = recording.span_s().1.min(start + STRETCH_S);
-    let count = ((end - start) / step) as usize + 1;
-    let mut k = from;
-    (0..count)
-        .map(|i| {
-            let t = start + i as f64 * step;
-            while k + 2 < recording.samples.len() && recording.samples[k + 1].t <= t {
-                k += 1;
-            }
-            let next = (k + 1).min(local.len() - 1);
-            let span = recording.samples[next].t - recording.samples[k].t;
-            let u = if span > 0.0 {
-                ((t - recording.samples[k].t) / span).clamp(0.0, 1.0)
-            } else {
-                0.0
-            };
-            (local[k].iter().zip(&local[next]))
-                .map(|(a, b)| a + u * (b - a))
-                .collect()
-        })
-        .collect()
-}
-
-/// Root mean square distance of rows from their mean.
-fn spread(rows: &[Vec<f64>]) -> f64 {
-    let dim = rows.first().map_or(0, Vec::len);
-    let n = rows.len().max(1) as f64;
-    let mean: Vec<f64> = (0..dim)
-        .map(|axis| rows.iter().map(|row| row[axis]).sum::<f64>() / n)
-        .collect();
-    (rows.iter().map(|row| distance(row, &mean)).sum::<f64>() / n).sqrt()
 }
 
 fn check_motion(set: &GestureSet, moved: f64, frame: &[[f64; 3]]) -> Result<(), DefineError> {
@@ -290,77 +197,150 @@ pub fn define_cyclic(
     marks: CyclicMarks,
 ) -> Result<Definition, DefineError> {
     check_mark(recording, "start", marks.start_s)?;
-    let frames = frames_of(set, recording)?;
-    let start = nearest(recording, marks.start_s);
-    let local = local_of(set, &frames, start)?;
-    let times: Vec<f64> = recording.samples.iter().map(|sample| sample.t).collect();
-    let t0 = times[start];
-    let (duration_s, periodicity) = match marks.end_s {
-        Some(end_s) => {
-            check_mark(recording, "end", end_s)?;
-            (end_s - t0, None)
-        }
+    match marks.end_s {
+        Some(end_s) => with_end(set, recording, name, source, marks.start_s, end_s),
         None => {
-            let samples = (times.len() - start).max(2);
-            let step = ((times[times.len() - 1] - t0) / (samples - 1) as f64).max(1e-4);
-            let uniform = resampled(recording, &local, start, step);
-            check_motion(set, spread(&uniform), &frames[start])?;
-            let found = find_period(&uniform, step);
-            let periodicity = found.map_or(0.0, |found| found.periodicity);
-            let period = match found {
-                Some(found) if found.periodicity >= PERIODIC => found.period_s,
-                _ => {
-                    return Err(DefineError::NoPeriod {
-                        start_s: marks.start_s,
-                        periodicity,
-                    });
-                }
-            };
-            // With what precedes the mark, as far as it is compared.
-            let before = nearest(recording, t0 - COMPARED * period).min(start);
-            let around = resampled(recording, &local, before, step);
-            let first = ((t0 - times[before]) / step).round() as usize;
-            (
-                end_of_period(&around, first, step, period),
-                Some(periodicity),
-            )
+            let example = Example::new(set, recording, marks.start_s)?;
+            let found = example.period(marks.start_s)?;
+            example.by_period(name, source, found)
         }
-    };
-    if !(PERIODS_S.0 * 0.97..=PERIODS_S.1 * 1.03).contains(&duration_s) {
-        if duration_s <= 0.0 {
+    }
+}
+
+/// A cyclic gesture between two marks.
+pub(super) fn with_end(
+    set: &GestureSet,
+    recording: &Recording,
+    name: &str,
+    source: &str,
+    start_s: f64,
+    end_s: f64,
+) -> Result<Definition, DefineError> {
+    let example = Example::new(set, recording, start_s)?;
+    check_mark(recording, "end", end_s)?;
+    example.cut(name, source, end_s - example.times[example.start], None)
+}
+
+/// A cyclic gesture from its start and a period that is known already; its end is found near it.
+pub(super) fn with_period(
+    set: &GestureSet,
+    recording: &Recording,
+    name: &str,
+    source: &str,
+    start_s: f64,
+    found: PeriodEstimate,
+) -> Result<Definition, DefineError> {
+    Example::new(set, recording, start_s)?.by_period(name, source, found)
+}
+
+/// A recording with the start of one period in it.
+struct Example<'a> {
+    set: &'a GestureSet,
+    recording: &'a Recording,
+    frames: Vec<Vec<[f64; 3]>>,
+    local: Vec<Vec<f64>>,
+    times: Vec<f64>,
+    start: usize,
+}
+
+impl<'a> Example<'a> {
+    fn new(
+        set: &'a GestureSet,
+        recording: &'a Recording,
+        start_s: f64,
+    ) -> Result<Self, DefineError> {
+        let frames = frames_of(set, recording)?;
+        let start = nearest(recording, start_s);
+        Ok(Self {
+            set,
+            recording,
+            local: local_of(set, &frames, start)?,
+            frames,
+            times: recording.samples.iter().map(|sample| sample.t).collect(),
+            start,
+        })
+    }
+
+    /// Mean step of the samples from the start on, seconds.
+    fn step(&self) -> f64 {
+        let samples = (self.times.len() - self.start).max(2);
+        let last = self.times[self.times.len() - 1];
+        ((last - self.times[self.start]) / (samples - 1) as f64).max(1e-4)
+    }
+
+    fn period(&self, start_s: f64) -> Result<PeriodEstimate, DefineError> {
+        let step = self.step();
+        let uniform = resampled(self.recording, &self.local, self.start, step);
+        check_motion(self.set, spread(&uniform), &self.frames[self.start])?;
+        let found = find_period(&uniform, step);
+        found
+            .filter(|found| found.periodicity >= PERIODIC)
+            .ok_or(DefineError::NoPeriod {
+                start_s,
+                periodicity: found.map_or(0.0, |found| found.periodicity),
+            })
+    }
+
+    fn by_period(
+        &self,
+        name: &str,
+        source: &str,
+        found: PeriodEstimate,
+    ) -> Result<Definition, DefineError> {
+        let (step, period, t0) = (self.step(), found.period_s, self.times[self.start]);
+        // With what precedes the mark, as far as it is compared.
+        let before = nearest(self.recording, t0 - COMPARED * period).min(self.start);
+        let around = resampled(self.recording, &self.local, before, step);
+        let first = ((t0 - self.times[before]) / step).round() as usize;
+        let duration_s = end_of_period(&around, first, step, period);
+        self.cut(name, source, duration_s, Some(found.periodicity))
+    }
+
+    fn cut(
+        &self,
+        name: &str,
+        source: &str,
+        duration_s: f64,
+        periodicity: Option<f64>,
+    ) -> Result<Definition, DefineError> {
+        let (times, start) = (&self.times, self.start);
+        let t0 = times[start];
+        if !(PERIODS_S.0 * 0.97..=PERIODS_S.1 * 1.03).contains(&duration_s) {
+            if duration_s <= 0.0 {
+                return Err(DefineError::TooShort {
+                    first: "start",
+                    second: "end",
+                    frames: 0,
+                });
+            }
+            return Err(DefineError::PeriodOutOfRange {
+                period_s: duration_s,
+            });
+        }
+        let end = start + times[start..].partition_point(|t| *t < t0 + duration_s - 1e-9);
+        if end - start < FEWEST_FRAMES {
             return Err(DefineError::TooShort {
                 first: "start",
                 second: "end",
-                frames: 0,
+                frames: end - start,
             });
         }
-        return Err(DefineError::PeriodOutOfRange {
-            period_s: duration_s,
-        });
+        let size = spread(&self.local[start..end]);
+        check_motion(self.set, size, &self.frames[start])?;
+        let closing = end.min(self.local.len() - 1);
+        Ok(Definition {
+            gesture: Gesture {
+                name: name.into(),
+                kind: GestureKind::Cyclic,
+                duration_s,
+                source: source.into(),
+                times_s: times[start..end].iter().map(|t| t - t0).collect(),
+                frames: self.frames[start..end].to_vec(),
+            },
+            periodicity,
+            closure: distance(&self.local[start], &self.local[closing]).sqrt() / size.max(1e-12),
+        })
     }
-    let end = start + times[start..].partition_point(|t| *t < t0 + duration_s - 1e-9);
-    if end - start < FEWEST_FRAMES {
-        return Err(DefineError::TooShort {
-            first: "start",
-            second: "end",
-            frames: end - start,
-        });
-    }
-    let size = spread(&local[start..end]);
-    check_motion(set, size, &frames[start])?;
-    let closing = end.min(local.len() - 1);
-    Ok(Definition {
-        gesture: Gesture {
-            name: name.into(),
-            kind: GestureKind::Cyclic,
-            duration_s,
-            source: source.into(),
-            times_s: times[start..end].iter().map(|t| t - t0).collect(),
-            frames: frames[start..end].to_vec(),
-        },
-        periodicity,
-        closure: distance(&local[start], &local[closing]).sqrt() / size.max(1e-12),
-    })
 }
 
 /// Time after row `first` at which the surroundings of that row come back.

@@ -3,6 +3,9 @@
 //! ```toml
 //! handwave = "gestures"
 //! version = 1
+//! author = "A. Performer"                       # who made it, the terms, a note: optional, for people
+//! licence = "CC-BY-4.0"
+//! note = "right hand, seated"
 //! points = ["palm", "thumb_tip", "index_tip"]   # what is tracked, by name
 //! dim = 3                                       # coordinates per point, 2 or 3
 //! # The frame to which global motion is fitted: x, y, z of every point in metres.
@@ -36,7 +39,7 @@
 //! ```
 //! Unknown keys are errors. Lengths are written to 0.01 mm, times to 0.1 ms.
 
-use super::{Gesture, GestureKind, GestureOptions, GestureSet};
+use super::{About, Gesture, GestureKind, GestureOptions, GestureSet};
 use crate::pose::{GlobalOptions, PoseHeader};
 use serde::Deserialize;
 use std::path::Path;
@@ -90,6 +93,9 @@ pub enum GestureFileError {
 struct SetTable {
     handwave: String,
     version: u64,
+    author: Option<String>,
+    licence: Option<String>,
+    note: Option<String>,
     points: Vec<String>,
     #[serde(default = "three")]
     dim: usize,
@@ -259,6 +265,11 @@ impl GestureSet {
             reference: places(&table.reference, table.dim),
             options,
             gestures: Vec::new(),
+            about: About {
+                author: table.author,
+                licence: table.licence,
+                note: table.note,
+            },
         };
         for gesture in table.gesture {
             let key = |part: &str| format!("gesture {:?}.{part}", gesture.name);
@@ -320,6 +331,16 @@ impl GestureSet {
         let quoted = |name: &str| toml::Value::from(name).to_string();
         line("handwave = \"gestures\"".into());
         line(format!("version = {VERSION}"));
+        let about = &self.about;
+        for (key, value) in [
+            ("author", &about.author),
+            ("licence", &about.licence),
+            ("note", &about.note),
+        ] {
+            if let Some(value) = value {
+                line(format!("{key} = {}", quoted(value)));
+            }
+        }
         let names: Vec<String> = self.header.points.iter().map(|name| quoted(name)).collect();
         line(format!("points = [{}]", names.join(", ")));
         line(format!("dim = {}", self.header.dim));

@@ -1,5 +1,6 @@
 //! A set of gestures: what a performer defined, complete in itself.
 
+use super::About;
 use crate::pose::{GlobalOptions, PoseHeader};
 
 /// Whether a gesture repeats.
@@ -112,6 +113,8 @@ pub struct GestureSet {
     pub options: GestureOptions,
     /// The gestures in the order of the file.
     pub gestures: Vec<Gesture>,
+    /// Author, licence and note of the file.
+    pub about: About,
 }
 
 impl GestureSet {
@@ -127,6 +130,7 @@ impl GestureSet {
             reference,
             options: GestureOptions::default(),
             gestures: Vec::new(),
+            about: About::default(),
         }
     }
 

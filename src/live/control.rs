@@ -2,6 +2,7 @@
 
 use super::feed::Feed;
 use super::record::Recorder;
+use super::reload::Handover;
 use super::stats::Stats;
 use super::stop::{StopRequest, StopSwitch};
 use crate::base::{Clock, JointState, Time};
@@ -60,6 +61,8 @@ pub struct Parts<'a> {
     pub clock: &'a dyn Clock,
     /// Signals and keys.
     pub stop: &'a StopSwitch,
+    /// New gestures while the run goes on.
+    pub handover: Option<&'a mut Handover>,
     /// Who looks on.
     pub recorder: &'a mut dyn Recorder,
     /// Called once with the time of cycle 0 on `clock`.
@@ -142,6 +145,9 @@ fn cycles(
             let t_s = k as f64 * dt_s;
             parts.feed.take(t_s, &mut samples);
             stats.samples += samples.len() as u64;
+            if let Some(handover) = &mut parts.handover {
+                handover.cycle(parts.puppet, &samples);
+            }
             newest_sample_s = samples.last().map(|s| s.t).or(newest_sample_s);
             let request = parts.stop.request();
             if request == StopRequest::AtOnce {

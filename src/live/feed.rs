@@ -19,25 +19,107 @@ pub trait Feed {
 }
 
 /// Maps the stream's time to the control clock.
-#[derive(Copy, Clone, Debug, Default)]
-struct Schedule {
-    begins_at_s: Option<f64>,
-    first_t: Option<f64>,
+#[derive(Copy, Clone, Debug)]
+enum Schedule {
+    /// A recording begins when it is told to and keeps its own time.
+    Recorded {
+        begins_at_s: Option<f64>,
+        first_t: Option<f64>,
+    },
+    /// A live source's samples are due on arrival.
+    Live(SenderClock),
 }
 
 impl Schedule {
+    fn recorded() -> Self {
+        Self::Recorded {
+            begins_at_s: None,
+            first_t: None,
+        }
+    }
+
+    fn begin(&mut self, at_s: f64) {
+        if let Self::Recorded { begins_at_s, .. } = self {
+            *begins_at_s = Some(at_s);
+        }
+    }
+
     /// The sample with its time on the control clock if it is due by `now_s`; else itself.
     fn release(&mut self, mut sample: PoseSample, now_s: f64) -> Result<PoseSample, PoseSample> {
-        let Some(begins) = self.begins_at_s else {
+        let Self::Recorded {
+            begins_at_s,
+            first_t,
+        } = self
+        else {
+            return Ok(sample);
+        };
+        let Some(begins) = *begins_at_s else {
             return Err(sample);
         };
-        let first = *self.first_t.get_or_insert(sample.t);
+        let first = *first_t.get_or_insert(sample.t);
         let due = begins + (sample.t - first);
         if due > now_s {
             return Err(sample);
         }
         sample.t = due;
         Ok(sample)
+    }
+
+    /// What arrived together by `now_s`, brought to the control clock.
+    fn arrived(&mut self, now_s: f64, samples: &mut [PoseSample]) {
+        if let Self::Live(clock) = self {
+            clock.map(now_s, samples);
+        }
+    }
+}
+
+/// A sender's clock against ours, known only by when its samples arrive.
+///
+/// Samples arrive late by different times, never early: the smallest difference seen between arrival and
+/// stamp is the best. It may rise by a millisecond per second, so that clocks of different speed and a way
+/// that became longer are followed. Stamps that run backwards are another sender (or the same one started
+/// again) and begin anew.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct SenderClock {
+    offset_s: Option<f64>,
+    last_t: f64,
+    last_now_s: f64,
+}
+
+/// How fast the offset to a sender's clock may rise, seconds per second.
+const OFFSET_RISE: f64 = 1e-3;
+
+impl SenderClock {
+    /// Puts samples that arrived together by `now_s`, in their order, on our clock.
+    ///
+    /// Their times are then at most `now_s`. Allocates nothing.
+    pub fn map(&mut self, now_s: f64, samples: &mut [PoseSample]) {
+        if samples.is_empty() {
+            return;
+        }
+        if let Some(offset) = &mut self.offset_s {
+            *offset += OFFSET_RISE * (now_s - self.last_now_s).max(0.0);
+        }
+        self.last_now_s = now_s;
+        let mut from = 0;
+        while from < samples.len() {
+            if self.offset_s.is_some() && samples[from].t <= self.last_t {
+                self.offset_s = None;
+            }
+            // The last of those whose stamps rise was on its way for the shortest time.
+            let mut to = from + 1;
+            while to < samples.len() && samples[to].t > samples[to - 1].t {
+                to += 1;
+            }
+            self.last_t = samples[to - 1].t;
+            let seen = now_s - self.last_t;
+            let offset = self.offset_s.map_or(seen, |known| known.min(seen));
+            self.offset_s = Some(offset);
+            for sample in &mut samples[from..to] {
+                sample.t = (sample.t + offset).min(now_s);
+            }
+            from = to;
+        }
     }
 }
 
@@ -56,7 +138,7 @@ impl<R: BufRead> ReaderFeed<R> {
     pub fn new(reader: PoseReader<R>, first: PoseSample) -> Self {
         Self {
             reader,
-            schedule: Schedule::default(),
+            schedule: Schedule::recorded(),
             next: Some(first),
             spare: Vec::new(),
             over: false,
@@ -87,7 +169,7 @@ impl<R: BufRead> ReaderFeed<R> {
 
 impl<R: BufRead> Feed for ReaderFeed<R> {
     fn begin(&mut self, at_s: f64) {
-        self.schedule.begins_at_s = Some(at_s);
+        self.schedule.begin(at_s);
     }
 
     fn take(&mut self, now_s: f64, out: &mut Vec<PoseSample>) {
@@ -136,10 +218,12 @@ pub type ReaderThread = JoinHandle<(FaultCounts, Option<PoseError>)>;
 /// Samples read ahead.
 const AHEAD: usize = 512;
 
-/// Gives `first`, then what is left in `reader`, which a thread of its own reads ahead.
+/// Gives `first`, then what is left in `reader`, which a thread of its own reads ahead. The samples of a
+/// `live` source are due on arrival, others by their stamps.
 pub fn read_ahead<R: BufRead + Send + 'static>(
     mut reader: PoseReader<R>,
     first: PoseSample,
+    live: bool,
 ) -> std::io::Result<(QueueFeed, ReaderThread)> {
     let (mut items_in, items_out) = RingBuffer::new(AHEAD);
     let (used_in, mut used_out) = RingBuffer::<PoseSample>::new(AHEAD);
@@ -177,7 +261,11 @@ pub fn read_ahead<R: BufRead + Send + 'static>(
         QueueFeed {
             items: items_out,
             used: used_in,
-            schedule: Schedule::default(),
+            schedule: if live {
+                Schedule::Live(SenderClock::default())
+            } else {
+                Schedule::recorded()
+            },
             next: Some(first),
             over: false,
         },
@@ -185,12 +273,9 @@ pub fn read_ahead<R: BufRead + Send + 'static>(
     ))
 }
 
-impl Feed for QueueFeed {
-    fn begin(&mut self, at_s: f64) {
-        self.schedule.begins_at_s = Some(at_s);
-    }
-
-    fn take(&mut self, now_s: f64, out: &mut Vec<PoseSample>) {
+impl QueueFeed {
+    /// Appends what is due, as much as `out` has room for without growing.
+    fn take_due(&mut self, now_s: f64, out: &mut Vec<PoseSample>) {
         loop {
             if self.next.is_none() && !self.over {
                 match self.items.pop() {
@@ -214,6 +299,18 @@ impl Feed for QueueFeed {
                 }
             }
         }
+    }
+}
+
+impl Feed for QueueFeed {
+    fn begin(&mut self, at_s: f64) {
+        self.schedule.begin(at_s);
+    }
+
+    fn take(&mut self, now_s: f64, out: &mut Vec<PoseSample>) {
+        let before = out.len();
+        self.take_due(now_s, out);
+        self.schedule.arrived(now_s, &mut out[before..]);
     }
 
     fn give_back(&mut self, used: &mut Vec<PoseSample>) {

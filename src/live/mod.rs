@@ -4,15 +4,19 @@
 //! [`control`] is the loop: one cycle reads samples, steps the puppet, exchanges with the bus.
 //! [`session`] runs it, on a thread in real time or inline in virtual time.
 
+pub mod arrival;
 pub mod clock;
 pub mod control;
 pub mod feed;
+pub mod keys;
 pub mod realtime;
 pub mod record;
+pub mod reload;
 pub mod session;
 pub mod source;
 pub mod stats;
 pub mod stop;
+pub mod teach;
 pub mod wire;
 
 pub use clock::RealClock;

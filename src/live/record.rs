@@ -142,12 +142,21 @@ pub struct RecordReader {
     spare: Producer<Box<CycleRecord>>,
 }
 
+/// Gestures beyond those of the start for which records have room.
+const MORE_GESTURES: usize = 32;
+
 /// A queue of `depth` records for `puppet`.
 pub fn record_queue(puppet: &Puppet, depth: usize) -> (QueueRecorder, RecordReader) {
     let (full_in, full_out) = RingBuffer::new(depth);
     let (mut spare_in, spare_out) = RingBuffer::new(depth);
     let blank = CycleRecord::for_puppet(puppet);
-    while spare_in.push(Box::new(blank.clone())).is_ok() {}
+    let roomy = || {
+        let mut record = Box::new(blank.clone());
+        // Gestures that are defined while the run goes on must find room without an allocation.
+        record.gestures.reserve(MORE_GESTURES);
+        record
+    };
+    while spare_in.push(roomy()).is_ok() {}
     (
         QueueRecorder {
             full: full_in,

@@ -1,15 +1,17 @@
 //! A session: a character, its poses and its bus, run to the end in real or in virtual time.
 
+use super::arrival::Hangup;
 use super::control::{self, ControlOptions, Ending, Outcome, Parts};
 use super::feed::{ReaderFeed, read_ahead};
 use super::realtime::{self, RealTime};
 use super::record::{CycleRecord, Inline, record_queue};
+use super::reload::{self, News, Watcher};
 use super::stats::Stats;
 use super::stop::StopSwitch;
 use crate::base::{Clock, Time, VirtualClock};
 use crate::bus::{BusError, ServoBus, TorqueReport};
 use crate::config::file::{OnExit, OnLost, OnServoFault};
-use crate::config::{Character, ConfigError};
+use crate::config::{Character, ConfigError, GestureFiles};
 use crate::gesture::{FrontEnd, FrontEndError, TrackingCounts};
 use crate::motion::graph::TransitionCounts;
 use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader, PoseSample};
@@ -32,6 +34,8 @@ pub struct Report {
     pub transitions: TransitionCounts,
     /// Pose samples dropped, by reason.
     pub dropped: FaultCounts,
+    /// Datagrams of a live source that came before its header.
+    pub before_header: u64,
     /// Samples that the front end refused.
     pub refused: u64,
     /// What the front end mended of the tracker's.
@@ -137,6 +141,10 @@ pub trait Observer {
     fn cycle(&mut self, record: &CycleRecord);
     /// Called some times a second in real time; never in virtual time.
     fn tick(&mut self);
+    /// Gesture files were changed while the session ran.
+    fn news(&mut self, news: &News) {
+        let _ = news;
+    }
 }
 
 /// A session ready to run.
@@ -149,6 +157,10 @@ pub struct Session<R> {
     pub reader: PoseReader<R>,
     /// The first sample: a stream without one is found out before anything moves.
     pub first: PoseSample,
+    /// How the reader is ended when it is live; its samples are then due on arrival.
+    pub live: Option<Hangup>,
+    /// Gesture files that are loaded again when they change (real time only).
+    pub reload: Option<GestureFiles>,
     /// Signals and keys.
     pub stop: StopSwitch,
     /// Rate, duration, what happens at the end.
@@ -174,6 +186,7 @@ pub fn run_virtual<R: BufRead>(
             feed: &mut feed,
             clock,
             stop: &session.stop,
+            handover: None,
             recorder: &mut recorder,
             on_start: session.on_start.as_mut(),
         },
@@ -201,7 +214,16 @@ pub fn run_real<R: BufRead + Send + 'static>(
     observer: &mut dyn Observer,
     tick_hz: f64,
 ) -> Result<Report, SessionError> {
-    let (mut feed, reading) = read_ahead(session.reader, session.first)?;
+    let (mut handover, watcher) = match session.reload {
+        Some(files) => {
+            let header = session.reader.header();
+            let (ours, loader) = reload::handover(header);
+            let watcher = Watcher::start(files, header.clone(), loader)?;
+            (Some(ours), Some(watcher))
+        }
+        None => (None, None),
+    };
+    let (mut feed, reading) = read_ahead(session.reader, session.first, session.live.is_some())?;
     let (mut recorder, mut records) = record_queue(&session.puppet, RECORDS);
     let (mut puppet, mut bus, mut on_start) = (session.puppet, session.bus, session.on_start);
     let (stop, options) = (session.stop, session.options);
@@ -217,6 +239,7 @@ pub fn run_real<R: BufRead + Send + 'static>(
                     feed: &mut feed,
                     clock: clock.as_ref(),
                     stop: &stop,
+                    handover: handover.as_mut(),
                     recorder: &mut recorder,
                     on_start: on_start.as_mut(),
                 },
@@ -229,6 +252,9 @@ pub fn run_real<R: BufRead + Send + 'static>(
         while !control.is_finished() {
             std::thread::sleep(period);
             records.drain(|record| observer.cycle(record));
+            while let Some(news) = watcher.as_ref().and_then(Watcher::news) {
+                observer.news(&news);
+            }
             observer.tick();
         }
     }));
@@ -247,20 +273,20 @@ pub fn run_real<R: BufRead + Send + 'static>(
             "the control thread ended abnormally; the servos' own watchdog stops them",
         )));
     };
-    // A source that blocks (a pipe nobody writes to) must not hold up the end; its thread dies with us.
-    let read = if reading.is_finished() {
+    if let Some(live) = &session.live {
+        live.close();
+    }
+    // A source that blocks (a file on a device that hangs) must not hold up the end; its thread dies with us.
+    let read = if session.live.is_some() || reading.is_finished() {
         reading.join().unwrap_or_default()
     } else {
         Default::default()
     };
-    Ok(report(
-        outcome,
-        &puppet,
-        bus.as_ref(),
-        read,
-        lost,
-        Some(real_time),
-    ))
+    let report = report(outcome, &puppet, bus.as_ref(), read, lost, Some(real_time));
+    Ok(Report {
+        before_header: session.live.map_or(0, |live| live.before_header()),
+        ..report
+    })
 }
 
 fn report(
@@ -277,6 +303,7 @@ fn report(
         torque: outcome.torque,
         transitions: puppet.animator().counts(),
         dropped,
+        before_header: 0,
         refused: puppet.rejected_samples(),
         tracking: puppet.front().tracking(),
         performer_scale: puppet.front().performer_scale(),

@@ -2,7 +2,7 @@
 
 use super::bvh::BvhStream;
 use super::json::{self, JsonHeader};
-use super::{FaultCounts, MAX_LINE_BYTES, PoseError, PoseHeader, PoseSample};
+use super::{FaultCounts, LONGEST_STEP_S, MAX_LINE_BYTES, PoseError, PoseHeader, PoseSample};
 use super::{SampleFault, Validator, csv};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -52,7 +52,15 @@ pub struct PoseReader<R> {
     line: u64,
     bytes: Vec<u8>,
     done: bool,
+    tolerant: bool,
+    /// Time of a sample far in the past, which the next one may confirm as a sender's new start.
+    restart_t: Option<f64>,
 }
+
+/// A tolerant reader goes on after bad samples once this many were good: the sender knows the format.
+const PROVEN_BY: u64 = 50;
+/// A sample this much earlier than the last one, in seconds, is no late datagram but another clock.
+const RESTART_S: f64 = 1.0;
 
 impl PoseReader<BufReader<File>> {
     /// Opens a `.jsonl`, `.csv` or `.bvh` file and reads its header.
@@ -92,6 +100,8 @@ impl<R: BufRead> PoseReader<R> {
             line: 0,
             bytes: Vec::new(),
             done: false,
+            tolerant: false,
+            restart_t: None,
         };
         if format == PoseFormat::Bvh {
             reader.read_bvh()?;
@@ -128,6 +138,15 @@ impl<R: BufRead> PoseReader<R> {
         reader.stream = parsed.map_err(|fault| header(&reader, fault))?;
         reader.validator = Validator::new(reader.stream.header.points.len());
         Ok(reader)
+    }
+
+    /// The same reader for a live source, which is not to end because a sender stumbles: once 50 samples were
+    /// good, bad ones are counted without end, and a sender that starts again with another clock is followed
+    /// (at the cost of one sample).
+    #[must_use]
+    pub fn tolerant(mut self) -> Self {
+        self.tolerant = true;
+        self
     }
 
     fn read_bvh(&mut self) -> Result<(), PoseError> {
@@ -191,9 +210,17 @@ impl<R: BufRead> PoseReader<R> {
                 Ok(true) => self.validator.check(sample).map(|()| sample.t),
                 Err(fault) => Err(fault),
             };
+            let outcome = if self.tolerant {
+                self.forgive(outcome, sample)
+            } else {
+                outcome
+            };
             match self.validator.note(self.line, outcome) {
                 Ok(true) => return Ok(true),
                 Ok(false) => {}
+                Err(_) if self.tolerant && self.validator.accepted() >= PROVEN_BY => {
+                    self.validator.begin_anew();
+                }
                 Err(first) => {
                     return Err(PoseError::TooManyBad {
                         file: self.file.clone(),
@@ -203,6 +230,30 @@ impl<R: BufRead> PoseReader<R> {
                 }
             }
         }
+    }
+
+    /// Lets a sample pass that begins a new clock, when the one before did so already.
+    fn forgive(
+        &mut self,
+        outcome: Result<f64, SampleFault>,
+        sample: &PoseSample,
+    ) -> Result<f64, SampleFault> {
+        let Err(SampleFault::TimeBackwards { t, last }) = outcome else {
+            if outcome.is_ok() {
+                self.restart_t = None;
+            }
+            return outcome;
+        };
+        let before = self.restart_t;
+        if last - t > RESTART_S {
+            self.restart_t = Some(t);
+            if before.is_some_and(|before| t > before && t - before <= LONGEST_STEP_S) {
+                self.restart_t = None;
+                self.validator.begin_anew();
+                return self.validator.check(sample).map(|()| t);
+            }
+        }
+        outcome
     }
 
     /// Parses a line; false where it is no sample and no fault (the header said again).

@@ -290,6 +290,15 @@ impl Validator {
         (self.long_steps >= MAX_BAD_IN_A_ROW).then(|| first.clone())
     }
 
+    /// Forgets the time and the bad samples in a row, as for a new stream; the counts go on.
+    pub fn begin_anew(&mut self) {
+        *self = Self {
+            accepted: self.accepted,
+            counts: self.counts,
+            ..Self::new(self.points)
+        };
+    }
+
     /// Samples that passed.
     pub fn accepted(&self) -> u64 {
         self.accepted

@@ -65,6 +65,12 @@ const PHASE_JOIN: (f64, f64) = (2.0, 0.25);
 const FREQUENCY_JOIN: (f64, f64) = (1.5, 0.6);
 
 impl Join {
+    /// The wave comes from other gestures now: what jumps is drawn over as after a gap.
+    pub fn expect_a_jump(&mut self) {
+        self.joining = true;
+        self.leisure_s = FREQUENCY_JOIN.1;
+    }
+
     /// Frequency and phase for a class that does or does not move now.
     pub fn step(
         &mut self,

@@ -54,6 +54,25 @@ impl Display {
         }
     }
 
+    /// The gestures are others now, with these names.
+    pub fn rename_gestures(&mut self, names: &[String]) {
+        match self {
+            Display::Quiet => {}
+            Display::Lines(lines) => lines.rename_gestures(names),
+            #[cfg(feature = "tui")]
+            Display::Terminal(terminal) => terminal.rename_gestures(names),
+        }
+    }
+
+    /// Whether others may print lines beside it.
+    pub fn shares_the_terminal(&self) -> bool {
+        match self {
+            Display::Quiet | Display::Lines(_) => true,
+            #[cfg(feature = "tui")]
+            Display::Terminal(_) => false,
+        }
+    }
+
     /// Shows the newest cycle.
     pub fn draw(&mut self, newest: &CycleRecord) {
         match self {

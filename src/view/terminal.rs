@@ -27,6 +27,11 @@ impl Terminal {
         })
     }
 
+    /// The gestures are others now.
+    pub fn rename_gestures(&mut self, names: &[String]) {
+        self.names.gestures = names.to_vec();
+    }
+
     /// Counts one cycle.
     pub fn count(&mut self, record: &CycleRecord) {
         self.watch.count(record);

@@ -95,6 +95,15 @@ impl Player {
 
     /// One cycle with the samples due by now; samples that are not `heard` are lost. True while it goes on.
     pub fn step(&mut self, heard: bool) -> bool {
+        self.step_after(heard, |_, _| {})
+    }
+
+    /// The same; `before` is given the puppet and the samples first, as the control loop's parts are.
+    pub fn step_after(
+        &mut self,
+        heard: bool,
+        before: impl FnOnce(&mut Puppet, &[PoseSample]),
+    ) -> bool {
         let t_s = self.t_s();
         let from = self.next;
         while self.samples.get(self.next).is_some_and(|s| s.t <= t_s) {
@@ -105,6 +114,7 @@ impl Player {
         } else {
             &[]
         };
+        before(&mut self.puppet, samples);
         let inputs = Inputs {
             samples,
             states: &self.states,
@@ -113,6 +123,14 @@ impl Player {
         self.puppet.step(Time::from_secs(t_s), &inputs);
         self.cycle += 1;
         self.puppet.stage() != Stage::Done
+    }
+
+    /// The samples of the last two cycles, into `out`.
+    pub fn due(&self, out: &mut Vec<PoseSample>) {
+        out.clear();
+        let since_s = self.t_s() - 2.5 / RATE_HZ;
+        let given = self.samples[..self.next].iter();
+        out.extend(given.filter(|s| s.t > since_s).cloned());
     }
 
     pub fn positions(&self) -> &[f64] {

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test program uses a part")]
 
 pub mod character;
+pub mod counting;
 pub mod data;
 pub mod folder;
 pub mod limits;
