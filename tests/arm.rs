@@ -94,7 +94,7 @@ fn a_broken_map_or_class_is_refused_with_file_and_key() {
         config,
         "map = \"maps/arm.toml\"",
         "",
-        &["arm.toml", "one [[gesture]] file", "a class with `map`"],
+        &["arm.toml", "no gesture file", "a class with `map`"],
     );
     check(
         "quadruped.toml",

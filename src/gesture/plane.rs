@@ -15,7 +15,7 @@ const LOOP_SPREAD: f64 = 0.3;
 /// nor a gesture's length decides how much it counts.
 const BLOCK_WEIGHT: f64 = 100.0;
 /// Share of a gesture's energy below which a direction of movement is not relied on.
-const FAINT: f64 = 0.02;
+const FAINT: f64 = 0.018;
 /// Weight of the gesture's own mean pose, a rest pose where amplitude is zero.
 const REST_WEIGHT: f64 = 25.0;
 /// Share of its target that a component must explain to count at all, and to be brought to full size.

@@ -11,9 +11,10 @@ use super::bank::{Bank, Candidate};
 use super::fit::{Fit, Prior, Task, Wave};
 use super::history::History;
 use super::lsq::{BANK_HZ, LEAST_SAMPLES, RANGE_HZ, gate};
+use super::output::Output;
 use super::shape::{C, Shape};
 use super::{Estimator, LONGEST_GAP_S, PlanePoint, WaveEstimate};
-use crate::base::angle::{wrap_pi, wrap_tau};
+use crate::base::angle::wrap_tau;
 use crate::gesture::GestureOptions;
 use std::f64::consts::TAU;
 
@@ -77,7 +78,7 @@ pub struct FastEstimator {
     /// How full the lock's window is, 0..1.
     full: f64,
     raw: WaveEstimate,
-    out: WaveEstimate,
+    output: Output,
 }
 
 impl FastEstimator {
@@ -95,7 +96,7 @@ impl FastEstimator {
             trust: 1.0,
             full: 0.0,
             raw: WaveEstimate::default(),
-            out: WaveEstimate::default(),
+            output: Output::default(),
         }
     }
 
@@ -321,7 +322,7 @@ impl FastEstimator {
             white: fit.residual,
             rate: 1.0,
             learnt: 0.0,
-            since: t - since_s,
+            since: t - since_s.min(self.history.covered_s()),
             centre: None,
             bend: 0.0,
             size: fit.wave.a.norm(),
@@ -393,6 +394,11 @@ impl FastEstimator {
             lock.bend += (fit.wave.b.norm() - lock.bend) * periods.min(1.0);
             let size = fit.wave.a.norm();
             lock.size += (size - lock.size) * periods.min(1.0);
+        } else if lock.learnt <= LEARNT {
+            // The wave turned out slower than it was taken for: nothing is known of it yet.
+            lock.learnt = 0.0;
+            lock.centre = None;
+            lock.size = fit.wave.a.norm();
         }
         self.full = (since_s * hz.abs() / (2.0 * self.lambda)).min(1.0);
         let mut share = self.trust * gate(explained, fit.evidence()) * sure(&fit);
@@ -409,39 +415,6 @@ impl FastEstimator {
             quality: explained,
         };
         self.lock = Some(lock);
-    }
-
-    fn smooth(&mut self, dt: f64) {
-        let raw = self.raw;
-        let was_silent = self.out.amplitude < 0.02;
-        let follow = |seconds: f64| 1.0 - (-dt / seconds).exp();
-        let gain = follow(SMOOTH_S[0] + self.full * self.full * (SMOOTH_S[1] - SMOOTH_S[0]));
-        self.out.amplitude += gain * (raw.amplitude - self.out.amplitude);
-        self.out.quality = raw.quality;
-        if raw.amplitude > 0.0 {
-            let flipped = raw.frequency_hz * self.out.frequency_hz <= 0.0;
-            if was_silent || flipped {
-                self.out.frequency_hz = raw.frequency_hz;
-            } else {
-                self.out.frequency_hz += gain * (raw.frequency_hz - self.out.frequency_hz);
-            }
-        }
-        let advance = TAU * self.out.frequency_hz * dt;
-        let predicted = self.out.phase_rad + advance;
-        self.out.phase_rad = if was_silent {
-            raw.phase_rad
-        } else if raw.amplitude <= 0.0 {
-            wrap_tau(predicted)
-        } else {
-            let limit = FASTEST_CORRECTION * dt;
-            let mut correction =
-                (follow(PHASE_S) * wrap_pi(raw.phase_rad - predicted)).clamp(-limit, limit);
-            if correction * advance < 0.0 {
-                let most = 0.9 * advance.abs();
-                correction = correction.clamp(-most, most);
-            }
-            wrap_tau(predicted + correction)
-        };
     }
 }
 
@@ -485,12 +458,6 @@ const PROOF: f64 = 45.0;
 const TIED: f64 = 0.125;
 /// Departures from the wave that are never a surprise, as a share of the amplitude.
 const FLOOR: f64 = 0.02;
-/// Time constant of amplitude and frequency with a short window and with a full one, seconds.
-const SMOOTH_S: [f64; 2] = [0.04, 0.2];
-/// Time constant of the phase, seconds.
-const PHASE_S: f64 = 0.08;
-/// Fastest correction of the phase, rad/s.
-const FASTEST_CORRECTION: f64 = 5.0;
 
 impl Estimator for FastEstimator {
     fn push(&mut self, t: f64, point: PlanePoint) {
@@ -498,7 +465,7 @@ impl Estimator for FastEstimator {
             self.slow.clear();
             self.quick.clear();
             self.lock = None;
-            self.out = WaveEstimate::default();
+            self.output.reset();
             self.last_t = t;
         }
         let dt = t - self.last_t;
@@ -507,12 +474,12 @@ impl Estimator for FastEstimator {
         self.slow.push(t, z);
         self.quick.push(t, z);
         self.update(t, dt);
-        self.smooth(dt);
+        self.output.push(dt, self.raw, self.full);
         self.last_t = t;
     }
 
     fn estimate(&self) -> WaveEstimate {
-        self.out
+        self.output.estimate()
     }
 
     fn reset(&mut self) {
@@ -521,7 +488,7 @@ impl Estimator for FastEstimator {
         self.quick.clear();
         self.lock = None;
         self.raw = WaveEstimate::default();
-        self.out = WaveEstimate::default();
+        self.output.reset();
         self.last_t = 0.0;
     }
 }

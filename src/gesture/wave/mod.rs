@@ -13,6 +13,7 @@ mod gabor;
 mod history;
 mod kernel;
 mod lsq;
+mod output;
 mod shape;
 mod smooth;
 mod window;

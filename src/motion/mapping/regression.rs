@@ -3,12 +3,16 @@
 //! Rhodin 2016, section 8.4, eq. 8.3: with a unit Gaussian prior on the rows of M, noise variance
 //! sigma^2 and a bias 1 appended to every input,
 //!
-//!     A = sigma^-2 X X^T + I,   y* = sigma^-2 Y X^T A^-1 x*,   q(x*) = x*^T A^-1 x*
+//! ```text
+//! A = sigma^-2 X X^T + I,   y* = sigma^-2 Y X^T A^-1 x*,   q(x*) = x*^T A^-1 x*
+//! ```
 //!
 //! A has one row per input, thousands of them against 4 to 8 pairs; by the matrix inversion lemma
 //! the same numbers come from the n x n matrix K = X^T X + sigma^2 I:
 //!
-//!     M = Y K^-1 X^T,           q(x*) = x*^T x* - (X^T x*)^T K^-1 (X^T x*)
+//! ```text
+//! M = Y K^-1 X^T,           q(x*) = x*^T x* - (X^T x*)^T K^-1 (X^T x*)
+//! ```
 //!
 //! Whichever matrix is smaller is factored.
 
