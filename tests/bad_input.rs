@@ -243,7 +243,7 @@ fn files_that_the_configuration_names() {
         &["graph.start", "locomotion"],
     );
     edited(
-        "estimator = \"gabor\"",
+        "estimator = \"default\"",
         "estimator = \"gabro\"",
         &["input.estimator", "gabro", "gabor"],
     );

@@ -65,7 +65,11 @@ fn with_on_lost_idle_motion_is_held_then_comes_to_rest_and_resumes_with_the_pose
         "lost too early"
     );
     let held = watched.play(lost_at_s + lost_s + 0.01, false);
-    assert!(held < 0.05, "not held when lost: {held} rad/s");
+    // A fiftieth of a second before the end of the easing it still shows a trace of the walk.
+    assert!(
+        held < 0.04 * coasting,
+        "not held when lost: {held} rad/s of {coasting}"
+    );
     watched.play(lost_at_s + lost_s + 0.05, false);
     assert!(
         watched.player.puppet.targets().poses_lost,

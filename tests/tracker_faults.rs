@@ -299,7 +299,7 @@ fn a_point_of_a_real_hand_may_be_hidden() {
             // Nothing but the palm tells where the hand as a whole is: without it for long, what
             // the fingers do together is lost.
             let most = match (hole, finger) {
-                (false, _) => [0.02, 0.02, 0.02, 0.1],
+                (false, _) => [0.04, 0.02, 0.02, 0.1],
                 (true, 0) => [0.3, 0.1, 0.02, 0.2],
                 (true, _) => [0.12, 0.1, 0.02, 0.2],
             };

@@ -117,15 +117,18 @@ impl FastEstimator {
         }
     }
 
-    /// Sum of squares of what `wave` leaves of the last `since_s` seconds.
+    /// Sum of squares of what `wave` leaves of the last `since_s` seconds, without the worst sample: one
+    /// alone, which a tracker may have got wrong, is no change.
     fn misfit(&self, wave: &Wave, since_s: f64) -> f64 {
-        (self.history.samples().iter())
-            .take_while(|sample| sample.lag_s <= since_s + 1e-9)
-            .map(|sample| {
-                let z = C::new(sample.z[0], sample.z[1]);
-                (z - wave.at(&self.shape, sample.lag_s)).norm_sqr()
-            })
-            .sum()
+        let recent = self.history.samples().iter();
+        let (mut sum, mut worst) = (0.0, 0.0_f64);
+        for sample in recent.take_while(|sample| sample.lag_s <= since_s + 1e-9) {
+            let z = C::new(sample.z[0], sample.z[1]);
+            let left = (z - wave.at(&self.shape, sample.lag_s)).norm_sqr();
+            sum += left;
+            worst = worst.max(left);
+        }
+        sum - worst
     }
 
     /// What `wave` leaves of the newest third of a period.
@@ -355,7 +358,7 @@ impl FastEstimator {
             {
                 match &held {
                     None => held = Some((lock, fit)),
-                    Some((old, held_fit)) if fit.evidence() > held_fit.evidence() + 2.0 => {
+                    Some((old, held_fit)) if likelier(&fit, held_fit) => {
                         lock.share = old.share;
                         lock.noise = lock.noise.max(old.noise);
                         lock.white = lock.noise;
@@ -418,6 +421,14 @@ impl FastEstimator {
     }
 }
 
+/// Whether a proposal takes over from the wave that is held: it explains more, or it explains as much by
+/// the gesture's own figure instead of the orthogonal one (performed the other way round).
+fn likelier(proposed: &Fit, held: &Fit) -> bool {
+    let own = |fit: &Fit| fit.wave.a.norm_sqr();
+    proposed.evidence() > held.evidence() + 2.0
+        || (own(proposed) > 2.0 * own(held) && proposed.explained() > held.explained() - 0.05)
+}
+
 /// Share of an amplitude that is believed by how well it is known: all up to a deviation of a quarter,
 /// nothing from a half.
 fn sure(fit: &Fit) -> f64 {
@@ -453,7 +464,7 @@ const DOUBT: [f64; 2] = [0.5, 1.2];
 /// Standard deviations of surprise at which a change is looked for.
 const SURPRISE: f64 = 2.5;
 /// By how much a new wave must fit better than the old one, in variances, to be a change.
-const PROOF: f64 = 45.0;
+const PROOF: f64 = 36.0;
 /// How long what is left hangs together, periods.
 const TIED: f64 = 0.125;
 /// Departures from the wave that are never a surprise, as a share of the amplitude.
