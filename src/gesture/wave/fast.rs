@@ -404,11 +404,17 @@ impl FastEstimator {
             lock.size = fit.wave.a.norm();
         }
         self.full = (since_s * hz.abs() / (2.0 * self.lambda)).min(1.0);
-        let mut share = self.trust * gate(explained, fit.evidence()) * sure(&fit);
+        let short = since_s * hz.abs() < SHORT;
+        // After a change few samples prove little; whether the wave goes on they tell all the same.
+        let mut share = if short && lock.learnt > LEARNT {
+            self.trust * gate(explained, f64::INFINITY)
+        } else {
+            self.trust * gate(explained, fit.evidence()) * sure(&fit)
+        };
         if lock.centre.is_none() {
             share *= self.seen(since_s.min(self.history.covered_s()) * hz.abs());
         }
-        let falling = share < lock.share && since_s * hz.abs() < SHORT;
+        let falling = share < lock.share && short;
         let pace = periods / if falling { 0.5 } else { 0.1 };
         lock.share += pace.min(1.0) * (share - lock.share);
         self.raw = WaveEstimate {
@@ -462,7 +468,7 @@ const LEARNT: f64 = 1.0;
 /// the past, and against one that does.
 const DOUBT: [f64; 2] = [0.5, 1.2];
 /// Standard deviations of surprise at which a change is looked for.
-const SURPRISE: f64 = 2.5;
+const SURPRISE: f64 = 1.5;
 /// By how much a new wave must fit better than the old one, in variances, to be a change.
 const PROOF: f64 = 36.0;
 /// How long what is left hangs together, periods.
