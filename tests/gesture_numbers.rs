@@ -66,13 +66,12 @@ fn a_loop_is_measured_exactly_in_both_senses() {
 }
 
 #[test]
-fn a_line_is_measured_as_well_as_the_gabor_bank_can() {
-    let [a, f, phase] = worst(Path::Line, &[0.25, 0.6, 1.0, 2.3], &[30.0, 60.0]);
+fn a_line_is_measured_as_well_as_a_loop() {
+    let [a, f, phase] = worst(Path::Line, &[0.25, 0.6, 1.0, 2.3, 5.5], &[30.0, 60.0]);
     println!("line: amplitude {a:.4}, frequency {f:.4}, phase {phase:.2} deg");
-    // A one-sided window cannot tell a line's two senses quite apart: the known price of this bank.
-    assert!(a < 0.16, "amplitude off by {a:.4} of itself");
-    assert!(f < 0.10, "frequency off by {f:.4} of itself");
-    assert!(phase < 25.0, "phase off by {phase:.2} degrees");
+    assert!(a < 0.02, "amplitude off by {a:.4} of itself");
+    assert!(f < 0.02, "frequency off by {f:.4} of itself");
+    assert!(phase < 5.0, "phase off by {phase:.2} degrees");
 }
 
 #[test]
@@ -125,7 +124,7 @@ fn noise_above(threshold: f64, rate: f64) -> f64 {
 }
 
 #[test]
-fn noise_alone_hardly_ever_counts_as_a_gesture() {
+fn noise_alone_hardly_ever_counts_as_a_gesture_to_the_thesis_s_bank() {
     for (rate, rise, abort) in [(30.0, 0.06, 0.6), (60.0, 0.001, 0.06), (120.0, 1e-6, 1e-3)] {
         let (above_rise, above_abort) = (noise_above(0.2, rate), noise_above(0.1, rate));
         println!("noise 0.3 at {rate} Hz: above 0.2 {above_rise:.4}, above 0.1 {above_abort:.4}");
@@ -160,7 +159,7 @@ fn settles(step: impl Fn(f64) -> (f64, f64), value: impl Fn(&FrontEnd) -> f64, t
 }
 
 #[test]
-fn steps_settle_within_two_periods() {
+fn steps_settle_within_half_a_period() {
     let f = settles(
         |t| (1.0, if t < 0.0 { 1.0 } else { 2.0 }),
         |front| front.estimates()[0].frequency_hz,
@@ -172,8 +171,8 @@ fn steps_settle_within_two_periods() {
         0.5,
     );
     println!("settling, smoothed: frequency 1 -> 2 Hz {f:.2} s, amplitude 1 -> 0.5 {a:.2} s");
-    assert!(f < 1.0, "frequency settles in {f:.2} s");
-    assert!(a < 1.6, "amplitude settles in {a:.2} s");
+    assert!(f < 0.25, "frequency settles in {f:.2} s");
+    assert!(a < 0.5, "amplitude settles in {a:.2} s");
 }
 
 #[test]
