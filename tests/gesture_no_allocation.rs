@@ -1,32 +1,16 @@
 //! After construction the front end allocates nothing, proved by a counting allocator.
-#![allow(unsafe_code, reason = "a global allocator cannot be had without")]
 
 mod gesture_support;
+mod support;
 
 use gesture_support::{Path, Random, header, pose, sample, times, wave_set};
-use handwave::gesture::{DerivedChannel, FrontEnd, FrontEndOptions, PerformerScale};
-use handwave::pose::PoseSample;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-struct Counting;
-
-// SAFETY: hands every call on to the system's allocator, unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
+use handwave::gesture::{
+    DerivedChannel, EstimatorKind, FrontEnd, FrontEndOptions, Gesture, GestureKind, GestureSet,
+    PerformerScale,
+};
+use handwave::pose::{PoseHeader, PoseSample};
+use std::f64::consts::TAU;
+use support::counting::{Counting, allocations};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -75,14 +59,14 @@ fn push_estimate_and_predict_allocate_nothing() {
         .map(|t| if t < 8.0 { t } else { t + 2.0 })
         .map(|t| sample(t, &pose(Path::Line, 1.0, 6.0 * t)))
         .collect();
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = allocations();
     let mut sum = 0.0;
     for sample in &samples {
         front.push(sample).expect("good sample");
         front.push(sample).expect_err("the same time again");
         sum += front.predict(0, sample.t + 0.01).amplitude + front.channel(0);
     }
-    let after = ALLOCATIONS.load(Ordering::Relaxed);
+    let after = allocations();
     assert!(sum > 0.0);
     assert_eq!(after - before, 0, "allocations in {} pushes", samples.len());
 
@@ -97,12 +81,12 @@ fn push_estimate_and_predict_allocate_nothing() {
     let nodes = [vec![0], vec![]];
     let mut front = FrontEnd::with_neighbourhoods(&set, &stream, options, &nodes).expect("match");
     let samples = troubled(6.0);
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = allocations();
     for (k, sample) in samples.iter().enumerate() {
         front.push(sample).ok();
         front.set_active(k / 100 % 2);
     }
-    let after = ALLOCATIONS.load(Ordering::Relaxed);
+    let after = allocations();
     let mended = front.tracking();
     assert!(
         mended.outliers > 10 && mended.swapped > 10 && mended.filled > mended.outliers,
@@ -115,4 +99,68 @@ fn push_estimate_and_predict_allocate_nothing() {
         "allocations in {} troubled pushes",
         samples.len()
     );
+}
+
+#[test]
+fn eight_gestures_of_a_hand_of_21_points_allocate_nothing_with_any_estimator() {
+    let header = PoseHeader {
+        points: (0..21).map(|k| format!("p{k}")).collect(),
+        dim: 3,
+        channels: Vec::new(),
+    };
+    let hand = |t: f64, gesture: usize| -> Vec<[f64; 3]> {
+        let (sin, cos) = (TAU * t).sin_cos();
+        (0..21)
+            .map(|k| {
+                let share = if k / 2 == gesture { 0.03 } else { 0.0 };
+                let x = k as f64;
+                [
+                    0.01 * x + share * cos,
+                    0.1 + share * sin,
+                    0.02 * (x * x).sin(),
+                ]
+            })
+            .collect()
+    };
+    let mut set = GestureSet::new(&header, hand(0.0, 99));
+    for gesture in 0..8 {
+        let times_s: Vec<f64> = (0..60).map(|k| f64::from(k) / 60.0).collect();
+        set.put(Gesture {
+            name: format!("g{gesture}"),
+            kind: GestureKind::Cyclic,
+            duration_s: 1.0,
+            source: "test".into(),
+            frames: times_s.iter().map(|t| hand(*t, gesture)).collect(),
+            times_s,
+        });
+    }
+    for kind in EstimatorKind::ALL {
+        let options = FrontEndOptions {
+            estimator: kind,
+            ..FrontEndOptions::default()
+        };
+        let mut front = FrontEnd::new(&set, &header, options).expect("match");
+        // Performed, changed, stopped: every path of the estimators.
+        let samples: Vec<PoseSample> = (0..720)
+            .map(|k| {
+                let t = f64::from(k) / 120.0;
+                let places = match t {
+                    t if t < 3.0 => hand(t, 2),
+                    t if t < 4.0 => hand(2.0 * t, 2),
+                    t if t < 5.0 => hand(1.4 * t, 6),
+                    _ => hand(0.0, 99),
+                };
+                sample(t, &places)
+            })
+            .collect();
+        let before = allocations();
+        let mut largest = 0.0_f64;
+        for sample in &samples {
+            front.push(sample).expect("good sample");
+            largest = largest.max(front.estimates()[2].amplitude);
+        }
+        let after = allocations();
+        assert_eq!(after - before, 0, "allocations with {}", kind.name());
+        assert!(largest > 0.5, "{}: {largest}", kind.name());
+    }
 }

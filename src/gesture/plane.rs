@@ -211,7 +211,7 @@ impl Plane {
     /// Trains the map of gesture `index`: its frames run once round the unit circle (or from 0 to 1),
     /// all frames of the other gestures and the mean pose map to zero.
     ///
-    /// Ridge regression with a bias ([`solve`]). A last step divides each component by the share the
+    /// Ridge regression with a bias, weak directions faded out. A last step divides each component by the share the
     /// regression explains, so that the reference itself measures amplitude 1, and drops one that it
     /// hardly explains; a non-cyclic map is brought to exactly 0 and 1 at its marks.
     pub fn train(set: &GestureSet, references: &References, index: usize) -> Self {
