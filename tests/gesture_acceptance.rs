@@ -6,8 +6,10 @@ mod gesture_support;
 use gesture_support::{Path, Random, header, pose, sample, times, wave_set};
 use handwave::base::wrap_pi;
 use handwave::gesture::{
-    Estimator, EstimatorKind, FrontEnd, FrontEndOptions, GestureOptions, PlanePoint, Shape,
+    CyclicMarks, Estimator, EstimatorKind, FrontEnd, FrontEndOptions, GestureOptions, GestureSet,
+    PlanePoint, Shape, define_cyclic,
 };
+use handwave::pose::Recording;
 use std::f64::consts::TAU;
 
 fn estimator(kind: EstimatorKind) -> Box<dyn Estimator> {
@@ -258,4 +260,69 @@ fn a_movement_that_nobody_defined_is_no_gesture() {
     }
     println!("a raised arm reads at most {largest:.3}");
     assert!(largest < 0.2, "a raised arm reads {largest:.3}");
+}
+
+/// The figure's hand, drawing something else than a circle.
+fn drawn(figure: &str, size: f64, phase: f64) -> Vec<[f64; 3]> {
+    let (up, forward) = match figure {
+        "eight" => (phase.cos(), (2.0 * phase).sin()),
+        "ellipse" => (phase.cos(), 0.35 * phase.sin()),
+        _ => (phase.cos(), phase.sin()),
+    };
+    let mut places = pose(Path::Loop, 0.0, 0.0);
+    for (point, share) in [(4, 0.5), (5, 1.0)] {
+        places[point][1] += 0.2 * size * share * up;
+        places[point][2] += 0.2 * size * share * forward;
+    }
+    places
+}
+
+#[test]
+fn figures_of_one_hand_are_told_apart_and_so_is_the_sense_of_turning() {
+    for pair in [["circle", "eight"], ["circle", "ellipse"]] {
+        let mut set = GestureSet::new(&header(), Vec::new());
+        for figure in pair {
+            let samples = times(60.0, 4.0, 0.0, 1)
+                .into_iter()
+                .map(|t| sample(t, &drawn(figure, 1.0, TAU * t)))
+                .collect();
+            let recording = Recording {
+                header: header(),
+                samples,
+            };
+            let marks = CyclicMarks {
+                start_s: 0.3,
+                end_s: None,
+            };
+            let found = define_cyclic(&set, &recording, figure, "test", marks).expect("periodic");
+            set.put(found.gesture);
+        }
+        for (performed, figure) in pair.into_iter().enumerate() {
+            for (size, hz) in [(1.0, 1.2), (0.6, 0.8)] {
+                let mut front =
+                    FrontEnd::new(&set, &header(), FrontEndOptions::default()).expect("match");
+                for t in times(60.0, 8.0, 0.1, 2) {
+                    let places = drawn(figure, size, TAU * hz * t);
+                    front.push(&sample(t, &places)).expect("good sample");
+                }
+                let read = front.estimates();
+                let line = format!(
+                    "{figure} of {size} at {hz} Hz reads {:.3} at {:.3} Hz, the other {:.3}",
+                    read[performed].amplitude,
+                    read[performed].frequency_hz,
+                    read[1 - performed].amplitude
+                );
+                println!("{line}");
+                assert!(
+                    (read[performed].amplitude / size - 1.0).abs() < 0.1,
+                    "{line}"
+                );
+                assert!(
+                    (read[performed].frequency_hz / hz - 1.0).abs() < 0.02,
+                    "{line}"
+                );
+                assert!(read[1 - performed].amplitude < 0.1, "{line}");
+            }
+        }
+    }
 }

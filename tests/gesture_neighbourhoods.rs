@@ -165,8 +165,9 @@ fn going_to_another_node_jumps_nowhere_and_is_as_if_one_had_always_been_there() 
         walker.planes()
     );
     assert!(jump < 0.03 && turn < 0.05, "{jump:.4}, {turn:.4} rad");
-    // Left hand and nod tell the same with and without the rest; the right hand does not.
-    assert_eq!(walker.planes(), 6, "planes that tell the same are shared");
+    // Left hand and nod tell the same with and without the rest. The right hand with and without the
+    // chest move in the same directions: no plane keeps these two apart, wherever one is.
+    assert_eq!(walker.planes(), 4, "planes that tell the same are shared");
 }
 
 #[test]

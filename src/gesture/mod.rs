@@ -9,6 +9,7 @@ mod channel;
 mod confusion;
 mod define;
 mod feature;
+mod figure;
 mod file;
 mod foreign;
 mod frames;

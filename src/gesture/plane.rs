@@ -1,5 +1,6 @@
 //! The linear map from a pose to a gesture's plane (Rhodin 2016, section 9.4.1, eq. 9.1 and 9.2).
 
+use super::figure::Figure;
 use super::{GestureKind, GestureSet, PlanePoint, Shape};
 use crate::pose::GlobalFit;
 use nalgebra::{DMatrix, DVector};
@@ -123,6 +124,25 @@ fn solve(x: DMatrix<f64>, z: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
     v.transpose() * onto
 }
 
+/// Per component the share of its targets that the plane explains.
+fn explained(plane: &Plane, rows: &[DVector<f64>], own: &[[f64; 2]]) -> [f64; 2] {
+    let (mut product, mut square) = ([0.0; 2], [0.0; 2]);
+    for (row, target) in rows.iter().zip(own) {
+        let z = plane.linear(row.as_slice());
+        for component in 0..2 {
+            product[component] += z[component] * target[component];
+            square[component] += target[component] * target[component];
+        }
+    }
+    std::array::from_fn(|c| {
+        if square[c] > 0.0 {
+            product[c] / square[c]
+        } else {
+            0.0
+        }
+    })
+}
+
 /// Root mean square distance of the frames from their mean, metres; 1 where nothing moves.
 fn size_of(rows: &[DVector<f64>], mean: &DVector<f64>) -> f64 {
     let square: f64 = rows.iter().map(|row| (row - mean).norm_squared()).sum();
@@ -131,7 +151,7 @@ fn size_of(rows: &[DVector<f64>], mean: &DVector<f64>) -> f64 {
 }
 
 /// Target of frame `k` on the gesture's plane before the phase is shifted.
-fn targets(set: &GestureSet, references: &References, index: usize) -> Vec<[f64; 2]> {
+pub(super) fn targets(set: &GestureSet, references: &References, index: usize) -> Vec<[f64; 2]> {
     let gesture = &set.gestures[index];
     let duration = gesture.duration_s.max(1e-9);
     if gesture.kind == GestureKind::NonCyclic {
@@ -229,6 +249,31 @@ impl Plane {
     ) -> Self {
         let gesture = &set.gestures[index];
         let own = targets(set, references, index);
+        let plane = Self::regressed(set, references, index, &own, &competes);
+        let told = plane.told(&references.local[index], &own);
+        if gesture.kind == GestureKind::NonCyclic || told > EXPLAINED.1 {
+            return plane.finished(set, references, index, &own);
+        }
+        // A gesture in the very directions of another one cannot be kept apart from it by a plane: it would
+        // not answer to itself. Their figures tell the two apart.
+        let figure = Figure::new(set, references, index);
+        let apart = |other: usize| {
+            competes(other)
+                && (set.gestures[other].kind == GestureKind::NonCyclic
+                    || !figure.rivals(&Figure::new(set, references, other)))
+        };
+        Self::regressed(set, references, index, &own, &apart).finished(set, references, index, &own)
+    }
+
+    /// The regression alone.
+    fn regressed(
+        set: &GestureSet,
+        references: &References,
+        index: usize,
+        own: &[[f64; 2]],
+        competes: &dyn Fn(usize) -> bool,
+    ) -> Self {
+        let gesture = &set.gestures[index];
         let mean = &references.mean[index];
         let dim = mean.len();
         let scale_m = size_of(&references.local[index], mean);
@@ -260,7 +305,7 @@ impl Plane {
             z[(k, 1)] = root * target[1];
         }
         let solution = solve(x, &z, set.options.ridge);
-        let mut plane = Self {
+        Self {
             kind: gesture.kind,
             rows: [0, 1]
                 .map(|c| DVector::from_iterator(dim, (0..dim).map(|a| solution[(a, c)] / scale_m))),
@@ -269,20 +314,36 @@ impl Plane {
             mean: mean.clone(),
             usual_variance: [1.0, 1.0],
             shape: Shape::LOOP,
-        };
-        plane.calibrate(&references.local[index], &own);
-        if gesture.kind == GestureKind::Cyclic {
-            plane.neighbours = evenly(set, references, index, &own);
+        }
+    }
+
+    /// Share of its targets that the better component of the plane explains.
+    fn told(&self, rows: &[DVector<f64>], own: &[[f64; 2]]) -> f64 {
+        let explained = explained(self, rows, own);
+        explained[0].max(explained[1])
+    }
+
+    /// Calibrated, with its reference's figure and neighbours.
+    fn finished(
+        mut self,
+        set: &GestureSet,
+        references: &References,
+        index: usize,
+        own: &[[f64; 2]],
+    ) -> Self {
+        self.calibrate(&references.local[index], own);
+        if self.kind == GestureKind::Cyclic {
+            self.neighbours = evenly(set, references, index, own);
             let mut sum = [0.0; 2];
-            for (frame, _) in &plane.neighbours {
-                let variance = plane.variance_of(frame.iter().copied());
+            for (frame, _) in &self.neighbours {
+                let variance = self.variance_of(frame.iter().copied());
                 sum[0] += variance[0] / NEIGHBOUR_FRAMES as f64;
                 sum[1] += variance[1] / NEIGHBOUR_FRAMES as f64;
             }
-            plane.usual_variance = sum;
-            plane.shape = plane.shape_of(&own);
+            self.usual_variance = sum;
+            self.shape = self.shape_of(own);
         }
-        plane
+        self
     }
 
     fn calibrate(&mut self, rows: &[DVector<f64>], own: &[[f64; 2]]) {
@@ -299,13 +360,8 @@ impl Plane {
             }
             return;
         }
-        for component in 0..2 {
-            let (mut product, mut square) = (0.0, 0.0);
-            for (row, target) in rows.iter().zip(own) {
-                product += place(self, row)[component] * target[component];
-                square += target[component] * target[component];
-            }
-            let explained = if square > 0.0 { product / square } else { 0.0 };
+        let explained = explained(self, rows, own);
+        for (component, explained) in explained.into_iter().enumerate() {
             let (least, enough) = EXPLAINED;
             let gain = if explained >= enough {
                 1.0 / explained

@@ -1,6 +1,7 @@
 //! One reader per gesture and neighbourhood of the motion graph: its plane and what reads it.
 
 use crate::base::angle::wrap_tau;
+use crate::gesture::figure::{self, Figure};
 use crate::gesture::foreign::{Span, Trust};
 use crate::gesture::wave::ProgressionSmoother;
 use crate::gesture::{
@@ -52,6 +53,7 @@ struct Reader {
     known: Vec<usize>,
     plane: Plane,
     trust: Trust,
+    figure: Figure,
     reading: Reading,
     estimate: GestureEstimate,
 }
@@ -65,6 +67,11 @@ struct Reader {
 pub(super) struct Readers {
     readers: Vec<Reader>,
     span: Span,
+    /// Pairs of readers of one neighbourhood whose gestures move in the same directions.
+    rivals: Vec<(usize, usize)>,
+    /// Per reader: a rival's figure is performed.
+    wrong: Vec<bool>,
+    last_t: Option<f64>,
     /// Per neighbourhood and gesture its reader; `None` where the gesture is out of reach.
     sets: Vec<Vec<Option<usize>>>,
     /// Neighbourhood of each node.
@@ -120,6 +127,7 @@ impl Readers {
                                 ProgressionSmoother::new(settings.progression_smoothing_s),
                             ),
                         },
+                        figure: Figure::new(set, references, *gesture),
                         trust: Trust::new(
                             references,
                             *gesture,
@@ -134,7 +142,22 @@ impl Readers {
             sets.push(row);
         }
         let kinds = set.gestures.iter().map(|gesture| gesture.kind);
+        let mut rivals = Vec::new();
+        for (one, reader) in readers.iter().enumerate() {
+            for (other, rival) in readers.iter().enumerate().skip(one + 1) {
+                let together = sets.iter().any(|row: &Vec<Option<usize>>| {
+                    row.contains(&Some(one)) && row.contains(&Some(other))
+                });
+                let waves = [reader, rival].map(|r| r.estimate.kind) == [GestureKind::Cyclic; 2];
+                if together && waves && reader.figure.rivals(&rival.figure) {
+                    rivals.push((one, other));
+                }
+            }
+        }
         Self {
+            rivals,
+            wrong: vec![false; readers.len()],
+            last_t: None,
             readers,
             span: Span::new(set, references),
             sets,
@@ -169,7 +192,40 @@ impl Readers {
                 }
             }
         }
+        self.compete(t, flat);
         self.gather();
+    }
+
+    /// Takes back the amplitude of gestures whose figure is not the one performed.
+    fn compete(&mut self, t: f64, flat: &[f64]) {
+        let dt = self.last_t.replace(t).map_or(0.0, |last| t - last);
+        for index in 0..self.readers.len() {
+            let rival = |(one, other): &(usize, usize)| *one == index || *other == index;
+            if self.rivals.iter().any(rival) {
+                let Reader {
+                    figure, estimate, ..
+                } = &mut self.readers[index];
+                figure.push(t, flat, estimate.amplitude, estimate.phase_rad);
+            }
+        }
+        let left = |index: usize| {
+            let reader = &self.readers[index];
+            reader.figure.left(reader.estimate.amplitude)
+        };
+        for index in 0..self.readers.len() {
+            let wrong = self.rivals.iter().any(|(one, other)| {
+                let rival = match index {
+                    i if i == *one => *other,
+                    i if i == *other => *one,
+                    _ => return false,
+                };
+                matches!((left(index), left(rival)), (Some(own), Some(best)) if figure::wrong(own, best))
+            });
+            self.wrong[index] = wrong;
+        }
+        for (reader, wrong) in self.readers.iter_mut().zip(&self.wrong) {
+            reader.estimate.amplitude *= reader.figure.settle(dt, *wrong);
+        }
     }
 
     /// Listens to the neighbourhood of `node`; one that does not exist changes nothing.
@@ -206,12 +262,14 @@ impl Readers {
     pub fn reset(&mut self) {
         for reader in &mut self.readers {
             reader.trust.reset();
+            reader.figure.reset();
             match &mut reader.reading {
                 Reading::Wave(estimator) => estimator.reset(),
                 Reading::Progression(smoother) => smoother.reset(),
             }
             reader.estimate = GestureEstimate::silent(reader.estimate.kind);
         }
+        self.last_t = None;
         self.gather();
     }
 }
