@@ -161,25 +161,12 @@ impl PoseFeatures {
                 expected: spec.header.dim,
             });
         }
-        // A stream of channels alone (a face) is read as points that move with its channels.
-        let places = if stream.points.is_empty() {
-            &stream.channels
-        } else {
-            &stream.points
-        };
-        let find = |name: &String| places.iter().position(|place| place == name);
         let names = &spec.header.points;
-        let missing: Vec<String> = names
-            .iter()
-            .filter(|n| find(n).is_none())
-            .cloned()
-            .collect();
-        if !missing.is_empty() {
-            return Err(FeatureError::MissingPoints {
+        let columns =
+            (stream.columns_of(names)).map_err(|missing| FeatureError::MissingPoints {
                 missing,
                 needed: names.clone(),
-            });
-        }
+            })?;
         let fit = GlobalFit::new(&spec.header, &spec.reference, &spec.global)
             .map_err(|anchor| FeatureError::Anchor { anchor })?;
         let points = names.len();
@@ -187,7 +174,7 @@ impl PoseFeatures {
         spec.mean.resize(points, [0.0; 3]);
         let width = points * spec.header.dim;
         Ok(Self {
-            columns: names.iter().filter_map(find).collect(),
+            columns,
             from_points: !stream.points.is_empty(),
             places: vec![[0.0; 3]; points],
             seen: vec![false; points],

@@ -7,6 +7,7 @@
 //! leaves clearly more of it, the rival's amplitude is taken back. Several gestures performed at once are
 //! foretold by none of them alone, and nothing is taken back.
 
+use super::foreign::add_direction;
 use super::{GestureSet, References, plane};
 use nalgebra::DVector;
 
@@ -62,15 +63,7 @@ impl Figure {
             .fold(0.0, f64::max);
         let mut span: Vec<DVector<f64>> = Vec::new();
         for part in parts.iter().flatten() {
-            let mut direction = part.clone();
-            for other in &span {
-                let along = direction.dot(other);
-                direction -= other * along;
-            }
-            let length = direction.norm();
-            if length > 0.1 * size.max(1e-9) {
-                span.push(direction / length);
-            }
+            add_direction(&mut span, part.clone(), 0.1 * size.max(1e-9));
         }
         let (periods, least, longest) = WINDOW;
         Self {

@@ -40,16 +40,9 @@ impl Span {
             (set.gestures.iter().zip(&references.local)).zip(&references.mean)
         {
             mean += own / references.local.len().max(1) as f64;
-            for mut direction in movements(gesture, frames, own) {
-                let whole = direction.norm();
-                for other in &directions {
-                    let along = direction.dot(other);
-                    direction -= other * along;
-                }
-                let length = direction.norm();
-                if length > LEAST_DIRECTION * whole.max(1e-9) {
-                    directions.push(direction / length);
-                }
+            for direction in movements(gesture, frames, own) {
+                let least = LEAST_DIRECTION * direction.norm().max(1e-9);
+                add_direction(&mut directions, direction, least);
             }
         }
         Self {
@@ -73,6 +66,22 @@ impl Span {
             }
         }
         &self.outside
+    }
+}
+
+/// Adds what of `direction` the orthonormal `directions` do not hold yet, where it is longer than `least`.
+pub(super) fn add_direction(
+    directions: &mut Vec<DVector<f64>>,
+    mut direction: DVector<f64>,
+    least: f64,
+) {
+    for other in directions.iter() {
+        let along = direction.dot(other);
+        direction -= other * along;
+    }
+    let length = direction.norm();
+    if length > least {
+        directions.push(direction / length);
     }
 }
 

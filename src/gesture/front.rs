@@ -140,26 +140,12 @@ impl FrontEnd {
                 expected: set.header.dim,
             });
         }
-        // A stream of channels alone (a face) is read as points that move with its channels.
-        let places = if stream.points.is_empty() {
-            &stream.channels
-        } else {
-            &stream.points
-        };
-        let find = |name: &String| places.iter().position(|place| place == name);
-        let missing: Vec<String> = set
-            .header
-            .points
-            .iter()
-            .filter(|name| find(name).is_none())
-            .cloned()
-            .collect();
-        if !missing.is_empty() {
-            return Err(FrontEndError::MissingPoints {
+        let columns = stream.columns_of(&set.header.points).map_err(|missing| {
+            FrontEndError::MissingPoints {
                 missing,
                 needed: set.header.points.clone(),
-            });
-        }
+            }
+        })?;
         let mut settings = set.options;
         settings.lambda = options.lambda.unwrap_or(settings.lambda);
         settings
@@ -195,7 +181,7 @@ impl FrontEnd {
         let mut fit = references.fit;
         fit.set_scale(scale.unwrap_or(1.0));
         Ok(Self {
-            columns: set.header.points.iter().filter_map(find).collect(),
+            columns,
             stream_points: stream.points.len(),
             fit,
             readers,

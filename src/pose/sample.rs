@@ -11,6 +11,27 @@ pub struct PoseHeader {
     pub channels: Vec<String>,
 }
 
+impl PoseHeader {
+    /// Index in a sample of this stream of each of `names`: among its points, or among its channels where
+    /// it has no points (a face, whose channels are read as points, [`super::channel_as_point`]).
+    ///
+    /// # Errors
+    /// The names that the stream does not have.
+    pub fn columns_of(&self, names: &[String]) -> Result<Vec<usize>, Vec<String>> {
+        let places = if self.points.is_empty() {
+            &self.channels
+        } else {
+            &self.points
+        };
+        let find = |name: &String| places.iter().position(|place| place == name);
+        let found: Option<Vec<usize>> = names.iter().map(find).collect();
+        found.ok_or_else(|| {
+            let missing = names.iter().filter(|name| find(name).is_none());
+            missing.cloned().collect()
+        })
+    }
+}
+
 /// One tracked pose. Right-handed, y up, metres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PoseSample {

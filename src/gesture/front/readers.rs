@@ -164,7 +164,7 @@ impl Readers {
             set_of_node,
             active: 0,
             estimates: kinds.map(GestureEstimate::silent).collect(),
-            with_variance: settings.under_constrained,
+            with_variance: settings.under_constrained && estimator.reads_variance(),
         }
     }
 

@@ -109,6 +109,11 @@ impl EstimatorKind {
         }
     }
 
+    /// Whether it reads [`PlanePoint::variance`], which costs a search of the reference per sample.
+    pub fn reads_variance(self) -> bool {
+        self == Self::Gabor
+    }
+
     /// A new estimator of this kind for a gesture whose reference draws `shape` on its plane.
     pub fn build(self, options: &GestureOptions, shape: Shape) -> Box<dyn Estimator> {
         match self {
