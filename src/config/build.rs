@@ -284,7 +284,7 @@ impl Character {
         let (start, edges, options) = &self.graph;
         let graph = Graph::new(classes.len(), *start, edges, *options);
         Ok(Animator::new(
-            Box::new(JointSpace::new(self.joints.len())),
+            Box::new(JointSpace::of_robot(&self.model, false)),
             classes,
             graph,
             layers,

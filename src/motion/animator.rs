@@ -1,12 +1,11 @@
 //! The animator: gesture waves and channels in, one pose out.
 
 use super::class::{Drive, Played};
-use super::clip::RootAdvance;
 use super::graph::{Graph, Transition, TransitionCounts};
 use super::layer::Layer;
 use super::mapping::Seen;
 use super::node::Node;
-use crate::body::PoseSpace;
+use crate::body::{PoseSpace, RootAdvance, RootPose};
 
 /// Classes, the graph between them, and layers on top; all state of the character's motion.
 pub struct Animator {
@@ -19,17 +18,6 @@ pub struct Animator {
     /// Two poses one after the other: of the active class and of the one being entered.
     pair: Vec<f64>,
     root: RootPose,
-}
-
-/// Where the body would be on the ground if feet did not slip.
-#[derive(Copy, Clone, Debug, Default, PartialEq)]
-pub struct RootPose {
-    /// Metres, in the direction the body first faced.
-    pub x_m: f64,
-    /// Metres to the left of it.
-    pub y_m: f64,
-    /// Heading, rad, counter-clockwise.
-    pub yaw_rad: f64,
 }
 
 impl Animator {
@@ -114,15 +102,9 @@ impl Animator {
         let mut velocity = RootAdvance::default();
         let parts = [(Some(active), 1.0 - blend), (entering, blend)];
         for (node, share) in parts.into_iter().filter_map(|(n, s)| n.map(|n| (n, s))) {
-            let v = self.played[node].root_velocity;
-            velocity.forward_m += share * v.forward_m;
-            velocity.left_m += share * v.left_m;
-            velocity.yaw_rad += share * v.yaw_rad;
+            velocity.add(self.played[node].root_velocity, share);
         }
-        let (sin, cos) = self.root.yaw_rad.sin_cos();
-        self.root.x_m += (cos * velocity.forward_m - sin * velocity.left_m) * dt_s;
-        self.root.y_m += (sin * velocity.forward_m + cos * velocity.left_m) * dt_s;
-        self.root.yaw_rad += velocity.yaw_rad * dt_s;
+        self.root.travel(velocity.scaled(dt_s));
     }
 
     /// Classes, in node order.

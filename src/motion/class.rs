@@ -182,7 +182,7 @@ impl MotionClass {
                 },
             });
         }
-        let joints = examples[0].clip.joints();
+        let joints = examples[0].clip.coordinates();
         let clips: Vec<&Clip> = examples.iter().map(|e| &e.clip).collect();
         let steepness = Steepness::of(&clips);
         let (limb_of, offsets) = timelines(name, &clips, joints)?;

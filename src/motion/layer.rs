@@ -72,7 +72,7 @@ impl Layer {
         if clip.kind != ClipKind::Path {
             return None;
         }
-        let mut rest = vec![0.0; clip.joints()];
+        let mut rest = vec![0.0; clip.coordinates()];
         clip.pose(0.0, &mut rest);
         let fastest = Steepness::of(&[&clip]).rate_limit(&[1.0], 1.0, ranges, LAYER_SHARE)
             / std::f64::consts::TAU;

@@ -26,8 +26,8 @@ pub(super) fn timelines(
         return Ok((limb_of, vec![None; clips.len()]));
     };
     for (i, limb) in reference.limbs.iter().enumerate() {
-        for joint in &limb.joints {
-            limb_of[*joint] = Some(i);
+        for coordinate in &limb.coordinates {
+            limb_of[*coordinate] = Some(i);
         }
     }
     let offsets = clips

@@ -17,6 +17,7 @@ pub mod node;
 pub mod range;
 mod smooth;
 mod spline;
+pub mod take;
 pub mod weights;
 
 pub use animator::Animator;
