@@ -231,8 +231,8 @@ impl MotionClass {
     pub fn rest_pose(&mut self, space: &dyn PoseSpace, out: &mut [f64]) {
         let (lowest, _) = self.weights_map.frequencies();
         match self.kind {
-            ClipKind::Cycle => self.weigh([0.0, lowest], 1.0),
-            ClipKind::Path => self.weigh([1.0, 0.0], 1.0),
+            ClipKind::Cycle => self.weigh([0.0, lowest].into(), 1.0),
+            ClipKind::Path => self.weigh([1.0, 0.0].into(), 1.0),
         }
         self.sample(space, 0.0, out);
     }
@@ -303,7 +303,7 @@ impl MotionClass {
             coming_hz = goal;
         }
         let frequency_hz = state.frequency.value;
-        let wish = [amplitude, frequency_hz];
+        let wish = [amplitude, frequency_hz].into();
 
         // Range: shorten the stride first, then hold the highest frequency and give up the lock.
         self.weigh(wish, 1.0);
@@ -400,7 +400,7 @@ impl MotionClass {
         } else {
             0.0
         };
-        self.weigh([1.0, 0.0], 1.0);
+        self.weigh([1.0, 0.0].into(), 1.0);
         // Steepness is kept per radian of phase; one progression is one turn of it.
         let fastest = self
             .steepness
