@@ -158,7 +158,7 @@ pub(super) fn class_parts(
             }
             examples.push(Example {
                 clip,
-                parameters: [entry.amplitude, entry.frequency_hz],
+                parameters: [entry.amplitude, entry.frequency_hz].into(),
             });
         }
         let at_rest = examples.iter().filter(|e| e.parameters[0] == 0.0).count();
