@@ -59,7 +59,12 @@ impl Animator {
         let (n, len) = (classes.len(), space.len());
         let fastest = ranges
             .iter()
-            .map(|r| (TRANSITION_SHARE * r.velocity, TRANSITION_SHARE * r.acceleration))
+            .map(|r| {
+                (
+                    TRANSITION_SHARE * r.velocity,
+                    TRANSITION_SHARE * r.acceleration,
+                )
+            })
             .collect();
         Self {
             inertia: Inertia::new(space.as_ref()),
@@ -87,7 +92,11 @@ impl Animator {
         let mut standing = vec![0.0; self.space.len()];
         self.rest_pose(&mut standing);
         let limbs = (self.classes.iter())
-            .flat_map(|class| (0..feet.count()).map(|f| class.limb(feet.name(f))).collect::<Vec<_>>())
+            .flat_map(|class| {
+                (0..feet.count())
+                    .map(|f| class.limb(feet.name(f)))
+                    .collect::<Vec<_>>()
+            })
             .collect();
         self.pins = Some(PinnedFeet {
             limbs,
@@ -127,7 +136,11 @@ impl Animator {
         let event = self.step_graph(dt_s);
         let len = self.space.len();
         let active = self.graph.active();
-        let entering = self.graph.transition().filter(|t| t.jump_in_s.is_none()).map(|t| t.to);
+        let entering = self
+            .graph
+            .transition()
+            .filter(|t| t.jump_in_s.is_none())
+            .map(|t| t.to);
         let blend = self.graph.blend();
         let of = |node: usize| node * len..(node + 1) * len;
         match entering {
@@ -158,7 +171,11 @@ impl Animator {
     fn play_classes(&mut self, drives: &[Drive], dt_s: f64) {
         std::mem::swap(&mut self.poses, &mut self.last_poses);
         let len = self.space.len();
-        let entering = self.graph.transition().filter(|t| t.jump_in_s.is_none()).map(|t| t.to);
+        let entering = self
+            .graph
+            .transition()
+            .filter(|t| t.jump_in_s.is_none())
+            .map(|t| t.to);
         for (node, class) in self.classes.iter_mut().enumerate() {
             let shown = node == self.graph.active() || Some(node) == entering;
             class.show(shown, &drives[node]);

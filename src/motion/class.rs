@@ -193,7 +193,9 @@ impl MotionClass {
         };
         let windows = &self.options.leave;
         if windows.is_empty() {
-            return self.options.play != Play::Once || self.state.ended || self.state.progress == 0.0;
+            return self.options.play != Play::Once
+                || self.state.ended
+                || self.state.progress == 0.0;
         }
         // Standing still there is no point of the motion to wait for.
         let still = self.options.play == Play::Gesture && self.state.amplitude.value < AT_REST;
@@ -260,7 +262,12 @@ impl MotionClass {
 
     /// The parameters of amplitude and frequency, with the class's others as they are now.
     fn wish(&self, amplitude: f64, frequency_hz: f64) -> Parameters {
-        [amplitude, frequency_hz]
+        let [third, fourth] = &self.state.extra;
+        match self.weights_map.dimensions() {
+            0..=2 => [amplitude, frequency_hz].into(),
+            3 => [amplitude, frequency_hz, third.value].into(),
+            _ => [amplitude, frequency_hz, third.value, fourth.value].into(),
+        }
     }
 
     /// One step of `dt_s` under `drive`; the pose goes into `out`. Allocates nothing.
@@ -338,7 +345,11 @@ impl MotionClass {
                 Contact::During { from, duty } => {
                     let u = self.point(e, Some(limb), phase);
                     // The end of a path is not its beginning.
-                    let u = if self.kind == ClipKind::Path { u.min(1.0 - 1e-9) } else { u };
+                    let u = if self.kind == ClipKind::Path {
+                        u.min(1.0 - 1e-9)
+                    } else {
+                        u
+                    };
                     duty >= 1.0 || (u - from).rem_euclid(1.0) < duty
                 }
             };

@@ -63,7 +63,11 @@ impl Inertia {
         space.diff(played.1, shown.1, &mut self.rate);
         space.diff(played.0, shown.0, &mut self.offset);
         for (rate, offset) in self.rate.iter_mut().zip(&self.offset) {
-            *rate = if dt_s > 0.0 { (offset - *rate) / dt_s } else { 0.0 };
+            *rate = if dt_s > 0.0 {
+                (offset - *rate) / dt_s
+            } else {
+                0.0
+            };
         }
         self.since_s = 0.0;
         self.span_s = span_s;
@@ -136,7 +140,11 @@ mod tests {
         }
         assert!(steepest < 40.0, "acceleration {steepest:.1} rad/s^2");
         assert!(fastest < 3.0, "speed {fastest:.2} rad/s");
-        assert!((last - played(t)[0]).abs() < 1e-12, "ends {} off", last - played(t)[0]);
+        assert!(
+            (last - played(t)[0]).abs() < 1e-12,
+            "ends {} off",
+            last - played(t)[0]
+        );
     }
 
     #[test]
@@ -145,11 +153,23 @@ mod tests {
         for (u, value, slope) in [(0.0, (1.0, 0.0), (0.0, 1.0)), (1.0, (0.0, 0.0), (0.0, 0.0))] {
             let (keep, carry) = quintic(u);
             let (a, b) = (quintic(u - h), quintic(u + h));
-            assert!((keep - value.0).abs() < 1e-12 && (carry - value.1).abs() < 1e-12, "at {u}");
+            assert!(
+                (keep - value.0).abs() < 1e-12 && (carry - value.1).abs() < 1e-12,
+                "at {u}"
+            );
             let slopes = ((b.0 - a.0) / (2.0 * h), (b.1 - a.1) / (2.0 * h));
-            assert!((slopes.0 - slope.0).abs() < 1e-6 && (slopes.1 - slope.1).abs() < 1e-6, "at {u}: {slopes:?}");
-            let curve = ((a.0 - 2.0 * keep + b.0) / (h * h), (a.1 - 2.0 * carry + b.1) / (h * h));
-            assert!(curve.0.abs() < 1e-2 && curve.1.abs() < 1e-2, "at {u}: {curve:?}");
+            assert!(
+                (slopes.0 - slope.0).abs() < 1e-6 && (slopes.1 - slope.1).abs() < 1e-6,
+                "at {u}: {slopes:?}"
+            );
+            let curve = (
+                (a.0 - 2.0 * keep + b.0) / (h * h),
+                (a.1 - 2.0 * carry + b.1) / (h * h),
+            );
+            assert!(
+                curve.0.abs() < 1e-2 && curve.1.abs() < 1e-2,
+                "at {u}: {curve:?}"
+            );
         }
     }
 }

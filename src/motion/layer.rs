@@ -90,7 +90,9 @@ pub enum LayerError {
         hint: String,
     },
     /// The clock cannot drive a path: it has no end to come back from.
-    #[error("layer {layer}: clip {clip} is a path; the clock drives cycles (give a channel or a gesture)")]
+    #[error(
+        "layer {layer}: clip {clip} is a path; the clock drives cycles (give a channel or a gesture)"
+    )]
     ClockedPath {
         /// Layer name.
         layer: String,
@@ -259,9 +261,9 @@ impl Layer {
             (LayerDrive::Gesture(_), Some(drive)) => drive.frequency_hz.abs(),
             _ => self.frequency_hz,
         };
-        let most = self
-            .steepness
-            .scale_limit(&[1.0], TAU * hz.max(1e-6), &self.ranges, LAYER_SHARE);
+        let most =
+            self.steepness
+                .scale_limit(&[1.0], TAU * hz.max(1e-6), &self.ranges, LAYER_SHARE);
         asked.clamp(-most, most)
     }
 
@@ -294,7 +296,11 @@ impl Layer {
 }
 
 /// Which tangent coordinates a layer may move.
-fn mask(name: &str, options: &LayerOptions, space: &dyn PoseSpace) -> Result<Vec<bool>, LayerError> {
+fn mask(
+    name: &str,
+    options: &LayerOptions,
+    space: &dyn PoseSpace,
+) -> Result<Vec<bool>, LayerError> {
     let Some(parts) = &options.parts else {
         return Ok(vec![true; space.tangent_len()]);
     };

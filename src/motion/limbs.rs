@@ -29,7 +29,9 @@ pub(super) fn timelines(
             .map(|c| c.limbs.clone())
     };
     let moving = slowest(&mut clips.iter().filter(|c| moves(c)));
-    let reference = moving.clone().or_else(|| slowest(&mut clips.iter().filter(|c| !c.limbs.is_empty())));
+    let reference = moving
+        .clone()
+        .or_else(|| slowest(&mut clips.iter().filter(|c| !c.limbs.is_empty())));
     let mut limb_of = vec![None; coordinates];
     let Some(reference) = reference else {
         return Ok(Timelines {

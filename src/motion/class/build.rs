@@ -5,7 +5,7 @@ use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::limbs::timelines;
 use crate::motion::range::{JointRange, Steepness};
 use crate::motion::smooth::Follower;
-use crate::motion::weights::{Parameters, Weights, WeightsError};
+use crate::motion::weights::{Parameters, WeightKind, Weights, WeightsError};
 use std::ops::Range;
 
 /// Why a class cannot be built.
@@ -42,7 +42,9 @@ pub enum ClassError {
         found: &'static str,
     },
     /// A window that is none.
-    #[error("class {class}: leave = [{from}, {to}]: both must lie in 0..1, fractions of the cycle or path")]
+    #[error(
+        "class {class}: leave = [{from}, {to}]: both must lie in 0..1, fractions of the cycle or path"
+    )]
     Window {
         /// Class name.
         class: String,
@@ -92,6 +94,10 @@ pub struct ClassOptions {
     /// between 0.95 and 1.05 of it (eq. 9.7). Larger values let limbs change their phase sooner and slide more;
     /// 0 gives limbs no timelines of their own.
     pub limb_advance: f64,
+    /// How parameters become weights.
+    pub weights: WeightKind,
+    /// Names of the parameters beside amplitude and frequency, two at most, for messages.
+    pub extra: Vec<String>,
 }
 
 impl Default for ClassOptions {
@@ -100,6 +106,8 @@ impl Default for ClassOptions {
             play: Play::Gesture,
             leave: Vec::new(),
             limb_advance: 0.05,
+            weights: WeightKind::default(),
+            extra: Vec::new(),
         }
     }
 }
@@ -134,10 +142,11 @@ impl MotionClass {
             moving.extend(0..examples.len());
         }
         let parameters: Vec<Parameters> = moving.iter().map(|i| examples[*i].parameters).collect();
-        let weights_map = Weights::new(&parameters).map_err(|source| ClassError::Weights {
-            class: class(),
-            source,
-        })?;
+        let weights_map =
+            dimensioned(&parameters, &options).map_err(|source| ClassError::Weights {
+                class: class(),
+                source,
+            })?;
         let least_amplitude = parameters
             .iter()
             .map(|p| p[0])
@@ -188,6 +197,15 @@ impl MotionClass {
             examples,
         })
     }
+}
+
+/// The weights map, with the class's own names of its parameters.
+fn dimensioned(parameters: &[Parameters], options: &ClassOptions) -> Result<Weights, WeightsError> {
+    let names: Vec<&str> = ["amplitude", "frequency_hz"]
+        .into_iter()
+        .chain(options.extra.iter().map(String::as_str))
+        .collect();
+    Weights::named(parameters, options.weights, &names)
 }
 
 fn check_options(name: &str, kind: ClipKind, options: &ClassOptions) -> Result<(), ClassError> {

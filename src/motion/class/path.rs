@@ -76,7 +76,11 @@ impl MotionClass {
         Played {
             phase_rad: self.state.progress * TAU,
             frequency_hz: 0.0,
-            amplitude: if self.shown && !self.state.ended { 1.0 } else { 0.0 },
+            amplitude: if self.shown && !self.state.ended {
+                1.0
+            } else {
+                0.0
+            },
             stride: 1.0,
             locked: true,
             root_velocity: if dt_s > 0.0 {
