@@ -87,6 +87,13 @@ pub struct ClipFile {
     pub segments: Vec<Segment>,
     /// One row per frame, radians.
     pub frames: Vec<Vec<f64>>,
+    /// Per frame the pose of the root link over the ground in the travelling frame:
+    /// `[forward_m, left_m, height_m, roll_rad, pitch_rad, yaw_rad]`; empty when not known.
+    ///
+    /// The travelling frame moves with the root advance, evenly over the cycle; x forward, y left, z up.
+    /// The rotation is Rz(yaw) Ry(pitch) Rx(roll): pitch above zero is nose down.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub body: Vec<[f64; 6]>,
 }
 
 /// Why a clip cannot be used.
@@ -159,24 +166,33 @@ impl ClipFile {
     /// JSON text, one line per frame, numbers rounded to a micro-radian.
     pub fn to_json(&self) -> String {
         let round = |v: f64| (v * 1e6).round() / 1e6 + 0.0;
+        let rows = |rows: &mut dyn Iterator<Item = &[f64]>| {
+            let rows: Vec<String> = rows
+                .map(|row| {
+                    let numbers: Vec<f64> = row.iter().map(|v| round(*v)).collect();
+                    format!(
+                        "    {}",
+                        serde_json::to_string(&numbers).unwrap_or_default()
+                    )
+                })
+                .collect();
+            format!("[\n{}\n  ]", rows.join(",\n"))
+        };
         let mut head = self.clone();
         head.frames.clear();
+        head.body.clear();
         let mut text = serde_json::to_string_pretty(&head).unwrap_or_default();
-        let rows: Vec<String> = self
-            .frames
-            .iter()
-            .map(|f| {
-                let numbers: Vec<f64> = f.iter().map(|v| round(*v)).collect();
-                format!(
-                    "    {}",
-                    serde_json::to_string(&numbers).unwrap_or_default()
-                )
-            })
-            .collect();
-        text = text.replace(
-            "\"frames\": []",
-            &format!("\"frames\": [\n{}\n  ]", rows.join(",\n")),
+        let mut tables = format!(
+            "\"frames\": {}",
+            rows(&mut self.frames.iter().map(Vec::as_slice))
         );
+        if !self.body.is_empty() {
+            tables += &format!(
+                ",\n  \"body\": {}",
+                rows(&mut self.body.iter().map(<[f64; 6]>::as_slice))
+            );
+        }
+        text = text.replace("\"frames\": []", &tables);
         text.push('\n');
         text
     }
@@ -212,6 +228,23 @@ impl ClipFile {
                     self.joints[j], frame[j]
                 ));
             }
+        }
+        if !self.body.is_empty() && self.body.len() != self.frames.len() {
+            return bad(format!(
+                "body has {} rows for {} frames; give one per frame, or none",
+                self.body.len(),
+                self.frames.len()
+            ));
+        }
+        if let Some(k) = self
+            .body
+            .iter()
+            .position(|row| row.iter().any(|v| !v.is_finite()))
+        {
+            return bad(format!(
+                "body, frame {k}: {:?} are not six finite numbers",
+                self.body[k]
+            ));
         }
         let root = [self.root.forward_m, self.root.left_m, self.root.yaw_rad];
         if root.iter().any(|v| !v.is_finite()) {
@@ -351,6 +384,7 @@ mod tests {
             root: RootAdvance::default(),
             segments: vec![],
             frames,
+            body: vec![],
         }
     }
 
@@ -370,13 +404,23 @@ mod tests {
             .expect_err("b is strange")
             .to_string();
         assert!(missing.contains("joint b is not in the robot"), "{missing}");
+        let mut afloat = good.clone();
+        afloat.body = vec![[0.0; 6]];
+        let message = ClipFile::from_json(&afloat.to_json())
+            .expect_err("one body row for two frames")
+            .to_string();
+        assert!(message.contains("1 rows for 2 frames"), "{message}");
         let unknown = good.to_json().replace("\"kind\"", "\"kindd\"");
         assert!(ClipFile::from_json(&unknown).is_err());
     }
 
     #[test]
     fn json_round_trip_and_joint_order_of_the_body() {
-        let good = file(vec![vec![0.0, 0.5], vec![1.0, 0.25]]);
+        let mut good = file(vec![vec![0.0, 0.5], vec![1.0, 0.25]]);
+        good.body = vec![
+            [0.0, 0.0, 0.2, 0.0, 0.0, 0.0],
+            [0.0, 0.01, 0.1, 0.0, 0.3, 0.0],
+        ];
         let back = ClipFile::from_json(&good.to_json()).expect("own output");
         assert_eq!(back, good);
         let clip = back

@@ -160,6 +160,7 @@ fn empty_file(description: &GaitDescription, model: &RobotModel, kind: ClipKind)
         root: RootAdvance::default(),
         segments: Vec::new(),
         frames: Vec::new(),
+        body: Vec::new(),
     }
 }
 
