@@ -7,7 +7,8 @@ pub mod envelope;
 pub mod kinematics;
 pub mod leg;
 pub mod model;
+pub mod tip;
 
 pub use envelope::{Envelope, JointEnvelope};
-pub use leg::Leg;
+pub use leg::{Facing, Leg};
 pub use model::{JointLimits, ModelError, RobotModel};
