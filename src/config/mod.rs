@@ -12,6 +12,7 @@ mod gestures;
 pub mod map;
 mod motion;
 mod servos;
+pub mod starter;
 
 pub use build::{Character, load};
 pub use error::ConfigError;

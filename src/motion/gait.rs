@@ -49,24 +49,24 @@ pub struct BodyPose {
     /// Height of the root link above the feet; that of the description when not given.
     pub body_height_m: Option<f64>,
     /// Nose down is positive, rad.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub pitch_rad: f64,
     /// Right side down is positive, rad.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub roll_rad: f64,
     /// Counter-clockwise seen from above, rad.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub yaw_rad: f64,
     /// Body displacement forwards, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub forward_m: f64,
     /// Body displacement to the left, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub left_m: f64,
     /// Progression at which the pose is reached, 0..1.
     pub at: Option<f64>,
     /// Feet that are elsewhere: by leg, from where the foot stands, forwards, left and up, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub feet: BTreeMap<String, [f64; 3]>,
 }
 
@@ -79,7 +79,7 @@ pub struct GaitDescription {
     /// Name of the clip.
     pub name: String,
     /// Where it comes from.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub origin: String,
     /// Preset of touch-down phases; a gait has this or `phase`.
     pub gait: Option<GaitName>,
@@ -88,7 +88,7 @@ pub struct GaitDescription {
     /// Body travel per cycle along its way, m; negative is backwards.
     pub stride_m: Option<f64>,
     /// Body travel per cycle to its left, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub left_m: f64,
     /// Fraction of the cycle a foot is on the ground, 0.1..1.
     pub duty_factor: Option<f64>,
@@ -97,29 +97,38 @@ pub struct GaitDescription {
     /// Height of the root link above the feet, m.
     pub body_height_m: Option<f64>,
     /// Turn per cycle, rad, counter-clockwise.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub turn_rad: f64,
     /// Feet further out than they stand by themselves, m on each side.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub stance_width_m: f64,
     /// Feet further from the middle, to the front and the rear, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub stance_length_m: f64,
     /// The body swings to the side that carries, m, once per cycle.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub sway_m: f64,
     /// It rolls with the sway, rad (right side down while it is right).
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub sway_roll_rad: f64,
     /// It goes up and down, m, twice per cycle.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub bob_m: f64,
     /// Touch-down phase per leg, fraction of the cycle.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub phase: BTreeMap<String, f64>,
     /// A way through poses instead of a gait; two or more.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pose: Vec<BodyPose>,
+}
+
+/// For serde, which hands over a reference.
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature serde asks for"
+)]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// Why a description cannot become a clip.

@@ -3,6 +3,7 @@
 //! [`model`] reads and checks a URDF, [`kinematics`] places its links, [`leg`] finds legs and
 //! solves them, [`envelope`] is the last thing every target passes before it leaves.
 
+pub mod adapt;
 pub mod envelope;
 pub mod kinematics;
 pub mod leg;
