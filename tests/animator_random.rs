@@ -36,7 +36,11 @@ impl Whim {
         if self.left_s < 0.0 {
             self.left_s = 0.4 + 5.0 * random.unit();
             let performs = random.unit() < 0.6;
-            self.wanted = if performs { 0.15 + 1.0 * random.unit() } else { 0.0 };
+            self.wanted = if performs {
+                0.15 + 1.0 * random.unit()
+            } else {
+                0.0
+            };
             self.frequency_hz = 0.4 + 2.2 * random.unit();
             if random.unit() < 0.2 {
                 self.phase_rad += 6.0 * random.unit() - 3.0;
@@ -84,7 +88,12 @@ impl<'a> SlideWatch<'a> {
         for (foot, stance) in self.stances.iter_mut().enumerate() {
             let at = root.to_world(self.feet.position(pose, foot));
             match (on_ground(foot), stance.began) {
-                (true, None) => *stance = Stance { began: Some(at), slid_m: 0.0 },
+                (true, None) => {
+                    *stance = Stance {
+                        began: Some(at),
+                        slid_m: 0.0,
+                    }
+                }
                 (true, Some(began)) => {
                     stance.slid_m = stance.slid_m.max((at.xy() - began.xy()).norm());
                 }
@@ -150,17 +159,25 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
             *wave = whim.step(&mut random);
         }
         if cycle % 400 == 0 {
-            goals.iter_mut().for_each(|g| *g = 1.4 * random.unit() - 0.7);
+            goals
+                .iter_mut()
+                .for_each(|g| *g = 1.4 * random.unit() - 0.7);
         }
         for (value, goal) in values.iter_mut().zip(&goals) {
             *value += (goal - *value) * (DT_S / 0.2);
         }
         for (drive, class) in drives.iter_mut().zip(&character.classes) {
             let wave = class.gesture.map_or(Drive::default(), |g| waves[g]);
-            *drive = Drive { extra: [values[0], values[values.len() - 1]], ..wave };
+            *drive = Drive {
+                extra: [values[0], values[values.len() - 1]],
+                ..wave
+            };
         }
         let before = allocations();
-        let input = LayerInput { channels: &values, gestures: &waves };
+        let input = LayerInput {
+            channels: &values,
+            gestures: &waves,
+        };
         animator.step(&drives, &input, DT_S, &mut pose);
         held_back += u32::from(envelope.pass(&pose[..joints], &mut sent) > 0);
         if cycle > 10 {
@@ -170,7 +187,9 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
             pose.iter().chain(&sent).all(|v| v.is_finite()),
             "{name}: not a number in cycle {cycle}, seed {seed}"
         );
-        limits.see(&sent).unwrap_or_else(|e| panic!("{name}, seed {seed}: {e}"));
+        limits
+            .see(&sent)
+            .unwrap_or_else(|e| panic!("{name}, seed {seed}: {e}"));
         let now = animator.root();
         jump_m = jump_m.max((now.x_m - root.x_m).hypot(now.y_m - root.y_m));
         jump_rad = jump_rad.max((now.yaw_rad - root.yaw_rad).abs());
@@ -194,11 +213,21 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
         limits.extremes(),
     );
     assert_eq!(allocated, 0, "{name}: allocations in the step");
-    assert!(slides.worst_mm() < 2.0, "{name}: a foot slid {:.2} mm in one stance", slides.worst_mm());
+    assert!(
+        slides.worst_mm() < 2.0,
+        "{name}: a foot slid {:.2} mm in one stance",
+        slides.worst_mm()
+    );
     assert!(counts.completed > 20, "{name}: only {counts:?}");
-    assert!(jump_m < 0.01 && jump_rad < 0.05, "{name}: root jumps {jump_m} m, {jump_rad} rad");
+    assert!(
+        jump_m < 0.01 && jump_rad < 0.05,
+        "{name}: root jumps {jump_m} m, {jump_rad} rad"
+    );
     // Random gestures are no normal playing; still the envelope is a guard and not a filter.
-    assert!(held_back < cycles as u32 / 200, "{name}: envelope acted in {held_back} cycles");
+    assert!(
+        held_back < cycles as u32 / 200,
+        "{name}: envelope acted in {held_back} cycles"
+    );
 }
 
 #[test]
