@@ -2,12 +2,13 @@
 
 use super::body::Body;
 use super::channel::{self, ChannelParts, channel_parts};
+use super::class::{ClassParts, class_parts};
 use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
 use super::gestures::{GestureFiles, Reader, merged};
-use super::layer::{LayerParts, channel_index, layer_parts};
-use super::motion::{ClassParts, GraphParts, class_parts, clip, graph_parts, neighbourhoods, read};
+use super::layer::{LayerParts, layer_parts};
+use super::motion::{GraphParts, clip, graph_parts, neighbourhoods, read};
 use super::servos::servo_map;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
@@ -15,15 +16,15 @@ use crate::gesture::{
     EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet, PerformerScale,
 };
 use crate::motion::Animator;
-use crate::motion::class::{EXTRA, MotionClass};
+use crate::motion::class::MotionClass;
 use crate::motion::clip::ClipKind;
 use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
-use crate::motion::layer::ChannelMap;
 use crate::motion::mapping::DirectClass;
 use crate::motion::node::Node;
 use crate::motion::range::JointRange;
 use crate::pose::PoseHeader;
+use crate::puppet::ClassInput;
 use crate::robot::{Envelope, JointEnvelope, RobotModel};
 
 /// A checked character: everything but the pose stream and the bus.
@@ -279,26 +280,12 @@ impl Character {
         })
     }
 
-    /// Per class the channels that drive its parameters beside amplitude and frequency.
-    pub fn extra_channels(
-        &self,
-        front: &FrontEnd,
-    ) -> Result<Vec<[Option<(usize, ChannelMap)>; EXTRA]>, ConfigError> {
+    /// Per class what drives it, bound to the channels of `front`; features are counted as in
+    /// [`Character::features`].
+    pub fn class_inputs(&self, front: &FrontEnd) -> Result<Vec<ClassInput>, ConfigError> {
+        let mut features = 0..;
         (self.classes.iter())
-            .map(|class| {
-                let mut bound = [None; EXTRA];
-                for (slot, parts) in bound.iter_mut().zip(&class.extra) {
-                    let channel =
-                        channel_index(front, &parts.channel).map_err(|e| ConfigError {
-                            file: self.config_name.clone(),
-                            line: Some(parts.line),
-                            key: "class.parameter.channel".into(),
-                            problem: format!("class {}: {e}", class.name),
-                        })?;
-                    *slot = Some((channel, parts.map));
-                }
-                Ok(bound)
-            })
+            .map(|class| class.input(front, &mut features, &self.config_name))
             .collect()
     }
 

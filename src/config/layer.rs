@@ -1,10 +1,11 @@
 //! Layers of a configuration, checked, and bound to the channels of a stream.
 
 use super::body::Body;
+use super::class::gesture_named;
 use super::error::{ConfigError, Pointer};
 use super::file::LayerEntry;
 use super::files::Files;
-use super::motion::{clip, gesture_named};
+use super::motion::clip;
 use crate::base::suggest::hint;
 use crate::gesture::{FrontEnd, GestureSet};
 use crate::motion::clip::Clip;

@@ -6,6 +6,7 @@
 pub mod body;
 pub mod build;
 mod channel;
+mod class;
 pub mod error;
 pub mod file;
 pub mod files;
