@@ -462,6 +462,12 @@ impl Puppet {
         &self.targets
     }
 
+    /// The animator's pose in the last step: joints before the envelope, then the body over the ground where
+    /// it walks.
+    pub fn pose(&self) -> &[f64] {
+        &self.pose
+    }
+
     /// Gestures as used in the last step, in file order.
     pub fn estimates(&self) -> &[GestureEstimate] {
         &self.estimates
