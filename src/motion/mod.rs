@@ -17,6 +17,7 @@ pub mod node;
 pub mod range;
 mod smooth;
 mod spline;
+pub mod warp;
 pub mod weights;
 
 pub use animator::Animator;
