@@ -27,11 +27,19 @@ fn mimic(file: &Path, skip: usize, columns: usize, cyclic: bool) -> FeatureClip 
         frames.pop();
     }
     FeatureClip {
-        name: file.file_stem().expect("named").to_string_lossy().into_owned(),
+        name: file
+            .file_stem()
+            .expect("named")
+            .to_string_lossy()
+            .into_owned(),
         cyclic,
         duration_s: 1.0,
         frames,
-        limbs: if columns == 12 { (0..4).map(|l| vec![3*l, 3*l+1, 3*l+2]).collect() } else { Vec::new() },
+        limbs: if columns == 12 {
+            (0..4).map(|l| vec![3 * l, 3 * l + 1, 3 * l + 2]).collect()
+        } else {
+            Vec::new()
+        },
     }
 }
 
@@ -41,7 +49,13 @@ fn table(clips: &[FeatureClip]) {
             .iter()
             .map(|b| {
                 let m = match_pair(a, b).expect("one body");
-                format!("{:5.2}/{:4.2}/{:4.2}{}", m.shape, m.by_limb, m.place, if m.still {"s"} else {" "})
+                format!(
+                    "{:5.2}/{:4.2}/{:4.2}{}",
+                    m.shape,
+                    m.by_limb,
+                    m.place,
+                    if m.still { "s" } else { " " }
+                )
             })
             .collect();
         println!("{:>24} {}", a.name, row.join("  "));
@@ -50,32 +64,107 @@ fn table(clips: &[FeatureClip]) {
 
 #[test]
 fn calibrate() {
-    let Some(human) = shared_data("human_joint") else { return };
-    let Some(dog) = shared_data("quadruped") else { return };
+    let Some(human) = shared_data("human_joint") else {
+        return;
+    };
+    let Some(dog) = shared_data("quadruped") else {
+        return;
+    };
     for cyclic in [true] {
         println!("cyclic {cyclic}");
-        table(&["walk","jog","run","jump","spin"].map(|n| mimic(&human.join(format!("humanoid3d_{n}.txt")), 8, 36, cyclic)));
-        table(&["pace","trot","canter","spin"].map(|n| mimic(&dog.join(format!("dog3d/dog3d_{n}.txt")), 8, 76, cyclic)));
-        table(&["trot0.txt","trot1.txt","pace0.txt","leftturn0.txt","jump0.json"].map(|n| mimic(&dog.join("a1").join(n), 7, 12, cyclic)));
-        table(&["dog_pace","dog_trot","dog_backwards_pace","dog_backwards_trot","dog_spin","inplace_steps","runningman","sidesteps","turn","hopturn"].map(|n| mimic(&dog.join(format!("laikago/{n}.txt")), 7, 12, cyclic)));
+        table(
+            &["walk", "jog", "run", "jump", "spin"]
+                .map(|n| mimic(&human.join(format!("humanoid3d_{n}.txt")), 8, 36, cyclic)),
+        );
+        table(
+            &["pace", "trot", "canter", "spin"]
+                .map(|n| mimic(&dog.join(format!("dog3d/dog3d_{n}.txt")), 8, 76, cyclic)),
+        );
+        table(
+            &[
+                "trot0.txt",
+                "trot1.txt",
+                "pace0.txt",
+                "leftturn0.txt",
+                "jump0.json",
+            ]
+            .map(|n| mimic(&dog.join("a1").join(n), 7, 12, cyclic)),
+        );
+        table(
+            &[
+                "dog_pace",
+                "dog_trot",
+                "dog_backwards_pace",
+                "dog_backwards_trot",
+                "dog_spin",
+                "inplace_steps",
+                "runningman",
+                "sidesteps",
+                "turn",
+                "hopturn",
+            ]
+            .map(|n| mimic(&dog.join(format!("laikago/{n}.txt")), 7, 12, cyclic)),
+        );
     }
     use handwave::motion::clip::ClipFile;
     use handwave::robot::RobotModel;
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
-    let urdf = std::fs::read_dir(dir.join("robots")).expect("x").flatten().map(|e| e.path()).collect::<Vec<_>>();
+    let urdf = std::fs::read_dir(dir.join("robots"))
+        .expect("x")
+        .flatten()
+        .map(|e| e.path())
+        .collect::<Vec<_>>();
     println!("{urdf:?}");
-    let q = urdf.iter().find(|p| p.to_string_lossy().ends_with("pup.urdf")).expect("quad");
-    let q = if q.is_dir() { std::fs::read_dir(q).expect("d").flatten().map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e=="urdf")).expect("urdf") } else { q.clone() };
+    let q = urdf
+        .iter()
+        .find(|p| p.to_string_lossy().ends_with("pup.urdf"))
+        .expect("quad");
+    let q = if q.is_dir() {
+        std::fs::read_dir(q)
+            .expect("d")
+            .flatten()
+            .map(|e| e.path())
+            .find(|p| p.extension().is_some_and(|e| e == "urdf"))
+            .expect("urdf")
+    } else {
+        q.clone()
+    };
     let model = RobotModel::from_urdf(&std::fs::read_to_string(q).expect("t")).expect("model");
     for m in [None, Some(&model)] {
-        let clips: Vec<FeatureClip> = ["stand","trot_short","trot_long","walk_short","walk_long","heading"].iter().map(|n| {
-            let f = ClipFile::from_json(&std::fs::read_to_string(dir.join(format!("clips/{n}.json"))).expect("f")).expect("c");
+        let clips: Vec<FeatureClip> = [
+            "stand",
+            "trot_short",
+            "trot_long",
+            "walk_short",
+            "walk_long",
+            "heading",
+        ]
+        .iter()
+        .map(|n| {
+            let f = ClipFile::from_json(
+                &std::fs::read_to_string(dir.join(format!("clips/{n}.json"))).expect("f"),
+            )
+            .expect("c");
             println!("{} {:?}", f.name, f.kind);
             FeatureClip::from_clip(&f.for_body(&model.joint_names()).expect("b"), m)
-        }).collect();
+        })
+        .collect();
         let (cycles, rest): (Vec<_>, Vec<_>) = clips.into_iter().partition(|c| c.cyclic);
         table(&cycles);
-        println!("{:?}", handwave::motion::warp::align(&cycles).expect("a").clips.iter().map(|c| (c.name.clone(), c.offset_cycles, c.cost, c.limb_offsets.clone())).collect::<Vec<_>>());
+        println!(
+            "{:?}",
+            handwave::motion::warp::align(&cycles)
+                .expect("a")
+                .clips
+                .iter()
+                .map(|c| (
+                    c.name.clone(),
+                    c.offset_cycles,
+                    c.cost,
+                    c.limb_offsets.clone()
+                ))
+                .collect::<Vec<_>>()
+        );
         table(&rest);
     }
 }

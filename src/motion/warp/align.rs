@@ -118,12 +118,7 @@ pub fn match_pair(a: &FeatureClip, b: &FeatureClip) -> Result<PairMatch, WarpErr
 }
 
 /// Cost with every limb rotated on its own, the other features by the offset of the whole.
-fn limb_cost(
-    a: &FeatureClip,
-    b: &FeatureClip,
-    size_a: f64,
-    size_b: f64,
-) -> Result<f64, WarpError> {
+fn limb_cost(a: &FeatureClip, b: &FeatureClip, size_a: f64, size_b: f64) -> Result<f64, WarpError> {
     let offsets = limb_offsets(&a.frames, &b.frames, &a.limbs)?;
     let whole = phase_match(&a.frames, &b.frames)?.offset_cycles;
     let fixed = normalised(a, 0.0, size_a);
@@ -137,9 +132,7 @@ fn limb_cost(
         }
     }
     let pairs = fixed.len();
-    let met: f64 = (0..pairs)
-        .map(|k| distance_sq(&fixed[k], &turned[k]))
-        .sum();
+    let met: f64 = (0..pairs).map(|k| distance_sq(&fixed[k], &turned[k])).sum();
     let random: f64 = fixed
         .iter()
         .map(|x| turned.iter().map(|y| distance_sq(x, y)).sum::<f64>())
