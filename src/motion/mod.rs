@@ -18,6 +18,7 @@ pub mod node;
 pub mod range;
 mod smooth;
 mod spline;
+pub mod suggest;
 pub mod warp;
 pub mod weights;
 

@@ -232,8 +232,7 @@ impl InverseMap {
                 p
             } else {
                 // Even over the simplex: exponential shares.
-                w.iter_mut()
-                    .for_each(|w| *w = -(1.0 - random.unit()).ln());
+                w.iter_mut().for_each(|w| *w = -(1.0 - random.unit()).ln());
                 let sum: f64 = w.iter().sum();
                 w.iter_mut().for_each(|w| *w /= sum);
                 evaluate(&w)?
