@@ -130,41 +130,43 @@ fn calibrate() {
         q.clone()
     };
     let model = RobotModel::from_urdf(&std::fs::read_to_string(q).expect("t")).expect("model");
-    for m in [None, Some(&model)] {
-        let clips: Vec<FeatureClip> = [
-            "stand",
-            "trot_short",
-            "trot_long",
-            "walk_short",
-            "walk_long",
-            "heading",
-        ]
-        .iter()
-        .map(|n| {
-            let f = ClipFile::from_json(
-                &std::fs::read_to_string(dir.join(format!("clips/{n}.json"))).expect("f"),
-            )
-            .expect("c");
-            println!("{} {:?}", f.name, f.kind);
-            FeatureClip::from_clip(&f.for_body(&model.joint_names()).expect("b"), m)
-        })
-        .collect();
-        let (cycles, rest): (Vec<_>, Vec<_>) = clips.into_iter().partition(|c| c.cyclic);
-        table(&cycles);
-        println!(
-            "{:?}",
-            handwave::motion::warp::align(&cycles)
-                .expect("a")
-                .clips
-                .iter()
-                .map(|c| (
-                    c.name.clone(),
-                    c.offset_cycles,
-                    c.cost,
-                    c.limb_offsets.clone()
-                ))
-                .collect::<Vec<_>>()
-        );
-        table(&rest);
-    }
+    let space = handwave::body::JointSpace::of_robot(&model, false);
+    let clips: Vec<FeatureClip> = [
+        "stand",
+        "trot_short",
+        "trot_long",
+        "walk_short",
+        "walk_long",
+        "heading",
+        "bow",
+        "crouch",
+        "lie",
+    ]
+    .iter()
+    .map(|n| {
+        let f = ClipFile::from_json(
+            &std::fs::read_to_string(dir.join(format!("clips/{n}.json"))).expect("f"),
+        )
+        .expect("c");
+        println!("{} {:?}", f.name, f.kind);
+        FeatureClip::from_clip(&f.for_space(&space).expect("b"), &space)
+    })
+    .collect();
+    let (cycles, rest): (Vec<_>, Vec<_>) = clips.into_iter().partition(|c| c.cyclic);
+    table(&cycles);
+    println!(
+        "{:?}",
+        handwave::motion::warp::align(&cycles)
+            .expect("a")
+            .clips
+            .iter()
+            .map(|c| (
+                c.name.clone(),
+                c.offset_cycles,
+                c.cost,
+                c.limb_offsets.clone()
+            ))
+            .collect::<Vec<_>>()
+    );
+    table(&rest);
 }

@@ -1,9 +1,9 @@
 //! What one control cycle shows to those who look on: targets, states, gestures, graph, bus.
 
 use crate::base::JointState;
+use crate::body::RootPose;
 use crate::bus::CycleReport;
 use crate::gesture::GestureEstimate;
-use crate::motion::animator::RootPose;
 use crate::motion::class::Played;
 use crate::motion::graph::Transition;
 use crate::puppet::{Puppet, Stage};

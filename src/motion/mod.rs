@@ -10,15 +10,18 @@ pub mod clip;
 pub mod gait;
 pub mod gait_frames;
 pub mod graph;
+pub mod inertia;
 pub mod inverse;
 pub mod layer;
 mod limbs;
 pub mod mapping;
 pub mod node;
+pub mod pins;
 pub mod range;
 mod smooth;
 mod spline;
 pub mod suggest;
+pub mod take;
 pub mod warp;
 pub mod weights;
 

@@ -43,7 +43,7 @@ pub struct Steepness {
 impl Steepness {
     /// Maxima over each clip.
     pub fn of(clips: &[&Clip]) -> Self {
-        let joints = clips.first().map_or(0, |c| c.joints());
+        let joints = clips.first().map_or(0, |c| c.coordinates());
         let mut first = Vec::new();
         let mut second = Vec::new();
         for clip in clips {

@@ -81,6 +81,21 @@ impl Spline {
         v * ya + w * yb + h * h / 6.0 * ((v * v * v - v) * ma + (w * w * w - w) * mb)
     }
 
+    /// Values of the coordinates `range` at `u` into `out`, as long as the range. No allocation.
+    pub fn values(&self, u: f64, range: std::ops::Range<usize>, out: &mut [f64]) {
+        let (a, b, w, h) = self.locate(u);
+        let v = 1.0 - w;
+        let bend = h * h / 6.0;
+        let (ca, cb) = (bend * (v * v * v - v), bend * (w * w * w - w));
+        let (a, b) = (a * self.coordinates, b * self.coordinates);
+        let of = |from: usize| from + range.start..from + range.end;
+        let knots = (self.values[of(a)].iter().zip(&self.values[of(b)]))
+            .zip(self.curvatures[of(a)].iter().zip(&self.curvatures[of(b)]));
+        for (out, ((ya, yb), (ma, mb))) in out.iter_mut().zip(knots) {
+            *out = v * ya + w * yb + ca * ma + cb * mb;
+        }
+    }
+
     /// First and second derivative of coordinate `c` with respect to u.
     pub fn derivatives(&self, u: f64, c: usize) -> (f64, f64) {
         let (a, b, w, h) = self.locate(u);

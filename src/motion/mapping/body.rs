@@ -15,7 +15,7 @@ pub fn target_frames(clips: &[Clip]) -> Vec<Vec<f64>> {
     let mut frames = Vec::new();
     for clip in clips {
         for k in 0..FRAMES_OF_A_CLIP {
-            let mut frame = vec![0.0; clip.joints()];
+            let mut frame = vec![0.0; clip.coordinates()];
             clip.pose(place(clip, k), &mut frame);
             frames.push(frame);
         }

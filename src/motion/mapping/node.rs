@@ -254,7 +254,7 @@ mod tests {
         let clip = walk();
         let pairs: Vec<Pair> = (0..8)
             .map(|k| {
-                let mut target = vec![0.0; clip.joints()];
+                let mut target = vec![0.0; clip.coordinates()];
                 clip.pose(f64::from(k) / 8.0, &mut target);
                 Pair {
                     label: format!("pair {k}"),

@@ -18,7 +18,7 @@ pub use phase::{PhaseMatch, limb_offsets, phase_match, phase_offset};
 pub use shape::Warp;
 
 use super::clip::{Clip, ClipKind};
-use crate::robot::RobotModel;
+use crate::body::PoseSpace;
 
 /// Frames x features.
 pub type Frames = [Vec<f64>];
@@ -160,51 +160,34 @@ pub struct FeatureClip {
 const SAMPLES: usize = 64;
 
 impl FeatureClip {
-    /// Embeds a joint-space clip: the origins of all links in the root's frame (m) when `model` is
-    /// given, else joint positions (rad). `clip` has the model's joint order.
+    /// Embeds a clip in the features of its body, metres ([`PoseSpace::embed`]).
     ///
-    /// Limbs are those of the clip; with a model their features are the links that the limb's
-    /// joints move.
-    pub fn from_clip(clip: &Clip, model: Option<&RobotModel>) -> Self {
-        let samples = SAMPLES;
+    /// Limbs are those of the clip; a limb's features are those that change when its joints turn.
+    pub fn from_clip(clip: &Clip, space: &dyn PoseSpace) -> Self {
         let cyclic = clip.kind == ClipKind::Cycle;
-        let mut pose = vec![0.0; clip.joints()];
-        let last = if cyclic { samples } else { samples - 1 };
-        let frames = (0..samples)
+        let last = if cyclic { SAMPLES } else { SAMPLES - 1 };
+        let mut pose = vec![0.0; space.len()];
+        let frames = (0..SAMPLES)
             .map(|k| {
                 clip.pose(k as f64 / last as f64, &mut pose);
-                match model {
-                    None => pose.clone(),
-                    Some(model) => (0..model.links.len())
-                        .flat_map(|link| {
-                            let p = model.link_pose(link, &pose).translation.vector;
-                            [p.x, p.y, p.z]
-                        })
-                        .collect(),
-                }
+                embedded(space, &pose)
             })
             .collect();
-        let limbs = clip
-            .limbs
-            .iter()
-            .map(|limb| match model {
-                None => limb.joints.clone(),
-                Some(model) => moved_links(model, &limb.joints)
-                    .into_iter()
-                    .flat_map(|link| 3 * link..3 * link + 3)
-                    .collect(),
-            })
-            .collect();
+        let duration_s = if cyclic && clip.frequency_hz > 0.0 {
+            1.0 / clip.frequency_hz
+        } else {
+            clip.duration_s
+        };
         Self {
             name: clip.name.clone(),
             cyclic,
             frames,
-            duration_s: if clip.frequency_hz > 0.0 {
-                1.0 / clip.frequency_hz
-            } else {
-                0.0
-            },
-            limbs,
+            duration_s,
+            limbs: clip
+                .limbs
+                .iter()
+                .map(|l| moved_features(space, &l.coordinates))
+                .collect(),
         }
     }
 
@@ -225,22 +208,29 @@ impl FeatureClip {
     }
 }
 
-/// Links whose place depends on one of `joints` (indices of actuated joints).
-fn moved_links(model: &RobotModel, joints: &[usize]) -> Vec<usize> {
-    let zero = vec![0.0; model.joint_names().len()];
-    let mut bent = zero.clone();
-    for joint in joints {
-        // Not a right angle: a mimicking or continuous joint must not come back to where it was.
-        if let Some(q) = bent.get_mut(*joint) {
-            *q = 0.37;
+fn embedded(space: &dyn PoseSpace, pose: &[f64]) -> Vec<f64> {
+    let mut features = vec![0.0; space.features()];
+    space.embed(pose, &mut features);
+    features
+}
+
+/// Features that change when the joints with these coordinates turn.
+fn moved_features(space: &dyn PoseSpace, coordinates: &[usize]) -> Vec<usize> {
+    let mut rest = vec![0.0; space.len()];
+    space.rest(&mut rest);
+    let mut turn = vec![0.0; space.tangent_len()];
+    for part in space.parts() {
+        if part.coordinates.clone().any(|c| coordinates.contains(&c)) {
+            // No part of a turn that could bring a joint back to where it was.
+            turn[part.tangent.clone()].fill(0.37);
         }
     }
-    (0..model.links.len())
-        .filter(|link| {
-            let a = model.link_pose(*link, &zero).translation.vector;
-            let b = model.link_pose(*link, &bent).translation.vector;
-            (a - b).norm() > 1e-6
-        })
+    let still = embedded(space, &rest);
+    let mut bent = rest;
+    space.add(&mut bent, &turn, 1.0);
+    let moved = embedded(space, &bent);
+    (0..still.len())
+        .filter(|c| (still[*c] - moved[*c]).abs() > 1e-9)
         .collect()
 }
 
