@@ -2,8 +2,8 @@
 //!
 //! Between unrelated clips there is no safe in-between (Casas 2013, 3.2.1). The thresholds were set on
 //! recorded motion: walk, jog and run of one person, trot and pace of one dog (each leg aligned on its
-//! own) cost at most 0.27; jumps, spins and turns against them at least 0.40; the project's walks and trots
-//! among themselves 0.04. `tests/class_building.rs` holds these figures.
+//! own) cost at most 0.24; jumps, spins and turns against them at least 0.40; the project's walks and trots
+//! among themselves 0.02. `tests/class_building.rs` holds these figures.
 
 use super::warp::{Alignment, FeatureClip, PairMatch, WarpError, align, match_pair};
 use std::fmt;

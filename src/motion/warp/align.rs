@@ -2,7 +2,7 @@
 
 use super::dtw::{DtwOptions, dtw};
 use super::phase::{limb_offsets, phase_match};
-use super::{FeatureClip, Warp, WarpError, distance_sq, mean, resampled_cycle, sampled};
+use super::{FeatureClip, SAMPLES, Warp, WarpError, distance_sq, mean, resampled_cycle, sampled};
 
 /// Below this part of the other clip's movement a clip counts as still (a rest pose).
 pub(crate) const STILL: f64 = 0.02;
@@ -94,14 +94,12 @@ pub fn match_pair(a: &FeatureClip, b: &FeatureClip) -> Result<PairMatch, WarpErr
             still: true,
         });
     }
-    let offset_cycles = if a.cyclic {
-        phase_match(&a.frames, &b.frames)?.offset_cycles
+    let (offset_cycles, warp) = if a.cyclic {
+        cyclic_warp(a, b, size_a, size_b)?
     } else {
-        0.0
+        let (x, y) = (normalised(a, 0.0, size_a), normalised(b, 0.0, size_b));
+        (0.0, dtw(&x, &y, &[], DtwOptions::default())?)
     };
-    let frames_a = normalised(a, 0.0, size_a);
-    let frames_b = normalised(b, offset_cycles, size_b);
-    let warp = dtw(&frames_a, &frames_b, &[], DtwOptions::default())?;
     let by_limb = if a.cyclic && !a.limbs.is_empty() {
         limb_cost(a, b, size_a, size_b)?
     } else {
@@ -115,6 +113,48 @@ pub fn match_pair(a: &FeatureClip, b: &FeatureClip) -> Result<PairMatch, WarpErr
         place,
         still: false,
     })
+}
+
+/// Offset and warp of two cycles.
+///
+/// A warp starts and ends with paired frames, and the best rotation alone need not pair any: a
+/// first warp tells what belongs to the middle of the cycle, the next one starts there. It also tells
+/// how long `b` dwells where `a` does, which its mean and size depend on.
+fn cyclic_warp(
+    a: &FeatureClip,
+    b: &FeatureClip,
+    size_a: f64,
+    size_b: f64,
+) -> Result<(f64, Warp), WarpError> {
+    let mut seam = phase_match(&a.frames, &b.frames)?.offset_cycles;
+    let options = DtwOptions::default();
+    let mut warp = dtw(
+        &normalised(a, 0.0, size_a),
+        &normalised(b, seam, size_b),
+        &[],
+        options,
+    )?;
+    for pass in 1..=2 {
+        let start = 0.5 * f64::from(pass % 2);
+        let paired = FeatureClip {
+            frames: (0..SAMPLES)
+                .map(|k| {
+                    let mut frame = Vec::new();
+                    let t = seam + warp.at(k as f64 / SAMPLES as f64);
+                    sampled(&b.frames, true, t, &mut frame);
+                    frame
+                })
+                .collect(),
+            limbs: Vec::new(),
+            ..b.clone()
+        };
+        seam += warp.at(0.5);
+        let dwelling = mean(&paired.frames);
+        let y = scaled(b, seam, &dwelling, paired.spread().max(0.5 * size_b));
+        warp = dtw(&normalised(a, start, size_a), &y, &[], options)?;
+    }
+    // Two halves of a turn were gone round: the last warp starts where the reference does.
+    Ok((seam - (seam - 0.5).ceil(), warp))
 }
 
 /// Cost with every limb rotated on its own, the other features by the offset of the whole.
@@ -142,21 +182,25 @@ fn limb_cost(a: &FeatureClip, b: &FeatureClip, size_a: f64, size_b: f64) -> Resu
 
 /// Deviations from the mean with root mean square 1; a cycle begins at `offset` and is closed.
 fn normalised(clip: &FeatureClip, offset: f64, size: f64) -> Vec<Vec<f64>> {
+    scaled(clip, offset, &mean(&clip.frames), size)
+}
+
+/// Deviations from `centre` over `size`; a cycle begins at `offset` and is closed.
+fn scaled(clip: &FeatureClip, offset: f64, centre: &[f64], size: f64) -> Vec<Vec<f64>> {
     let mut frames = if clip.cyclic {
-        resampled_cycle(&clip.frames, super::SAMPLES, offset)
+        resampled_cycle(&clip.frames, SAMPLES, offset)
     } else {
-        (0..super::SAMPLES)
+        (0..SAMPLES)
             .map(|k| {
                 let mut frame = Vec::new();
-                let u = k as f64 / (super::SAMPLES - 1) as f64;
+                let u = k as f64 / (SAMPLES - 1) as f64;
                 sampled(&clip.frames, false, u, &mut frame);
                 frame
             })
             .collect()
     };
-    let mean = mean(&clip.frames);
     for frame in &mut frames {
-        for (v, m) in frame.iter_mut().zip(&mean) {
+        for (v, m) in frame.iter_mut().zip(centre) {
             *v = (*v - m) / size;
         }
     }

@@ -10,6 +10,9 @@ pub struct DtwOptions {
     pub open_end: bool,
     /// Least and largest slope of the warp, of normalised times.
     pub slope: (f64, f64),
+    /// Move each pair of the path to where the poses agree best, by at most 1.5 frames: a path steps
+    /// by whole frames and keeps to the diagonal while that costs little.
+    pub refine: bool,
 }
 
 impl Default for DtwOptions {
@@ -17,6 +20,7 @@ impl Default for DtwOptions {
         Self {
             open_end: false,
             slope: (1.0 / 3.0, 3.0),
+            refine: true,
         }
     }
 }
@@ -61,6 +65,9 @@ pub fn dtw(
         .take(end.0 + 1)
         .map(|(sum, count)| sum / f64::from((*count).max(1)))
         .collect();
+    if options.refine {
+        refine(a, b, &mut wanted);
+    }
     let mut pins = vec![(0, 0.0)];
     pins.extend(
         keys.iter()
@@ -98,6 +105,33 @@ pub fn dtw(
     Ok(warp)
 }
 
+/// Two Gauss-Newton steps of every knot towards the nearest pose of `b`.
+fn refine(a: &Frames, b: &Frames, wanted: &mut [f64]) {
+    let last = (b.len() - 1) as f64;
+    // Where `b` hardly moves, a step has no direction: there the path's own pairing stays.
+    let moved: f64 = b.windows(2).map(|w| distance_sq(&w[0], &w[1])).sum();
+    let floor = 0.05 * moved / last;
+    let (mut here, mut before, mut after) = (Vec::new(), Vec::new(), Vec::new());
+    for (frame, knot) in a.iter().zip(wanted) {
+        let from = *knot;
+        for _ in 0..2 {
+            super::sampled(b, false, *knot, &mut here);
+            super::sampled(b, false, *knot - 0.5 / last, &mut before);
+            super::sampled(b, false, *knot + 0.5 / last, &mut after);
+            let (mut along, mut slope) = (0.0, 0.0);
+            for c in 0..here.len() {
+                let d = after[c] - before[c];
+                along += d * (frame[c] - here[c]);
+                slope += d * d;
+            }
+            let step = along / (slope + floor).max(f64::MIN_POSITIVE);
+            *knot = (*knot + step / last)
+                .clamp(from - 1.5 / last, from + 1.5 / last)
+                .clamp(0.0, 1.0);
+        }
+    }
+}
+
 /// Mean squared distance of `a(s)` and `b(warp(s))`.
 fn paired(a: &Frames, b: &Frames, warp: &Warp) -> f64 {
     let mut frame = Vec::new();
@@ -133,11 +167,14 @@ mod tests {
             let (a, b) = (clip(81, |t| t), clip(frames, time));
             let warp = dtw(&a, &b, &[], DtwOptions::default()).expect("two clips");
             let frame = 1.0 / (frames.min(81) - 1) as f64;
+            let mut worst: f64 = 0.0;
             for k in 0..=200 {
                 let t = f64::from(k) / 200.0;
                 let error = (warp.at(time(t)) - t).abs() / frame;
-                assert!(error < 1.0, "bend {bend}: {error:.2} frames off at {t}");
+                worst = worst.max(error);
             }
+            println!("bend {bend}: {worst:.2} frames off");
+            assert!(worst < 1.0, "bend {bend}: {worst:.2} frames off");
             assert!(warp.cost < 1e-3, "cost {}", warp.cost);
         }
     }
