@@ -4,6 +4,8 @@ pub mod bus;
 pub mod clip;
 mod failure;
 pub mod gesture;
+pub mod graph;
+mod graph_build;
 pub mod map;
 pub mod poses;
 pub mod run;
@@ -41,6 +43,8 @@ enum Command {
     Clip(clip::ClipArgs),
     /// Pose mapping: the performer's pose itself drives a body; suggest, learn, apply, study
     Map(map::MapArgs),
+    /// Motion classes: which clips belong together, how they align
+    Graph(graph::GraphArgs),
     /// Look at and set up servos on a bus
     Bus(bus::BusArgs),
     /// Simulated servos on a pseudo-terminal, for any client
@@ -57,6 +61,7 @@ pub fn main() -> ExitCode {
         Some(Command::Poses(args)) => poses::run(args),
         Some(Command::Clip(args)) => clip::run(&args),
         Some(Command::Map(args)) => map::run(args),
+        Some(Command::Graph(args)) => graph::run(&args),
         Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),
     };

@@ -5,7 +5,7 @@ use super::phase::{limb_offsets, phase_match};
 use super::{FeatureClip, SAMPLES, Warp, WarpError, distance_sq, mean, resampled_cycle, sampled};
 
 /// Below this part of the other clip's movement a clip counts as still (a rest pose).
-pub(crate) const STILL: f64 = 0.02;
+pub(in crate::motion) const STILL: f64 = 0.02;
 
 /// How two clips fit after alignment.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,6 +11,7 @@ mod path;
 mod phase;
 mod shape;
 
+pub(super) use align::STILL;
 pub use align::{Aligned, Alignment, PairMatch, align, match_pair};
 pub use dtw::{DtwOptions, dtw};
 pub use path::{CostTable, Path, cheapest_path};

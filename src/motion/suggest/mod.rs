@@ -5,6 +5,10 @@
 //! own) cost at most 0.24; jumps, spins and turns against them at least 0.40; the project's walks and trots
 //! among themselves 0.02. `tests/class_building.rs` holds these figures.
 
+mod parameters;
+
+pub use parameters::{Suggested, suggest_parameters};
+
 use super::warp::{Alignment, FeatureClip, PairMatch, WarpError, align, match_pair};
 use std::fmt;
 
