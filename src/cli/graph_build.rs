@@ -23,9 +23,9 @@ pub(super) const EXAMPLES: &str = "Examples:
       the warps as SVG too, one file a class
   handwave graph build --clips a.json b.json --json
 
-With --urdf poses are compared in metres (lever arms of the joints), without it in radians. Clips whose
-warp cost is 0.33 or more are unrelated: between them there is no safe in-between. Legs that are named in
-a clip's \"segments\" are aligned each on its own.";
+With --urdf poses are compared in metres (lever arms of the joints), else in radians. Clips with a
+warp cost of 0.33 or more are unrelated: there is no safe in-between. Legs that are named in a
+clip's \"segments\" are aligned each on its own; the plots show one warp for the whole body.";
 
 /// Arguments of `handwave graph build`.
 #[derive(Args, Debug)]
@@ -396,7 +396,7 @@ fn figure(built: &Built) -> crate::view::plot::Figure {
         series,
     };
     Figure {
-        title: format!("Warps of class {}", built.name),
+        title: format!("Class {}: one warp for the whole body", built.name),
         panels: vec![
             panel(
                 "Time of each clip, its offset taken off",

@@ -110,7 +110,7 @@ impl Chain {
         let i = self.table[1..last].partition_point(|t| t.1 <= p);
         let ((x0, p0), (x1, p1)) = (self.table[i], self.table[i + 1]);
         let w = if p1 > p0 {
-            ((p - p0) / (p1 - p0)).max(0.0).min(1.0)
+            ((p - p0) / (p1 - p0)).clamp(0.0, 1.0)
         } else {
             0.0
         };

@@ -69,7 +69,9 @@ impl Warp {
     /// t at `s` (clamped to 0..1; not-a-number is taken for 0). No allocation.
     pub fn at(&self, s: f64) -> f64 {
         let intervals = self.knots.len() - 1;
-        let x = s.max(0.0).min(1.0) * intervals as f64;
+        // Written so that not-a-number fails it.
+        let s = if s > 0.0 { s.min(1.0) } else { 0.0 };
+        let x = s * intervals as f64;
         let i = (x as usize).min(intervals - 1);
         let w = x - i as f64;
         self.knots[i] + w * (self.knots[i + 1] - self.knots[i])
@@ -80,7 +82,7 @@ impl Warp {
         let intervals = self.knots.len() - 1;
         let i = self.knots[1..intervals].partition_point(|k| *k <= t);
         let (from, to) = (self.knots[i], self.knots[i + 1]);
-        let w = ((t - from) / (to - from)).max(0.0).min(1.0);
+        let w = ((t - from) / (to - from)).clamp(0.0, 1.0);
         (i as f64 + w) / intervals as f64
     }
 

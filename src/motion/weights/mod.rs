@@ -187,11 +187,10 @@ impl Weights {
     pub fn at(&self, wish: impl Into<Parameters>, out: &mut [f64]) {
         let wish: Parameters = wish.into();
         let wish = wish.padded();
-        // `max` before `min`, so that not-a-number becomes the low edge.
+        // Written so that not-a-number becomes the low edge.
         let p: [f64; MOST_DIMENSIONS] = std::array::from_fn(|d| {
-            ((wish[d] - self.low[d]) * self.inverse_span[d])
-                .max(0.0)
-                .min(1.0)
+            let x = (wish[d] - self.low[d]) * self.inverse_span[d];
+            if x > 0.0 { x.min(1.0) } else { 0.0 }
         });
         let out = &mut out[..self.centres.len()];
         match &self.map {
