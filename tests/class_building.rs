@@ -5,6 +5,7 @@
 mod support;
 
 use handwave::body::JointSpace;
+use handwave::config::{self, Files};
 use handwave::motion::clip::ClipFile;
 use handwave::motion::suggest::{ClassMismatch, UNRELATED_FROM, check_class, compare, group};
 use handwave::motion::warp::{FeatureClip, WarpError, align};
@@ -12,6 +13,8 @@ use handwave::robot::RobotModel;
 use std::f64::consts::TAU;
 use std::path::Path;
 use support::data::shared_data;
+use support::folder::Folder;
+use support::program::{AT_MOST, Ended, Running, refused};
 
 /// A cycle of the DeepMimic family: JSON with "Frames"; after `skip` numbers (time, root) come
 /// `columns` joint numbers (quaternions and hinge angles). Twelve of them are four legs.
@@ -257,4 +260,105 @@ fn clips_that_cannot_be_compared_are_refused_by_name() {
     let kinds = align(&[good[0].clone(), good[2].clone()]).expect_err("cycle and path");
     assert!(matches!(kinds, WarpError::MixedKinds { .. }), "{kinds}");
     println!("{kinds}");
+}
+
+const GAITS: [&str; 7] = [
+    "stand",
+    "walk_short",
+    "walk_long",
+    "trot_short",
+    "trot_long",
+    "bow",
+    "heading",
+];
+
+/// `handwave graph build` on clips of a copy of `configs`, run from there.
+fn build(folder: &Folder, clips: &[&str], more: &[&str]) -> Ended {
+    let files: Vec<String> = clips.iter().map(|c| format!("clips/{c}.json")).collect();
+    let mut args = vec!["graph", "build", "--clips"];
+    args.extend(files.iter().map(String::as_str));
+    args.extend(["--urdf", "robots/pup.urdf"]);
+    args.extend(more);
+    Running::start_in(&folder.path("."), &args).wait(AT_MOST)
+}
+
+#[test]
+fn graph_build_prints_classes_that_a_character_can_be_given() {
+    let folder = Folder::of_configs();
+    let json = build(&folder, &GAITS, &["--json"]).expect(0).json();
+    let classes = json["classes"].as_array().expect("classes");
+    assert_eq!(classes.len(), 3, "gaits, bow, heading: {json:#}");
+    let gaits = &classes[0];
+    assert_eq!(gaits["clips"].as_array().map(Vec::len), Some(5));
+    assert_eq!(gaits["problem"], serde_json::Value::Null);
+    let trot = &gaits["clips"][4];
+    let turn = trot["limb_offsets_cycles"]["front_left"]
+        .as_f64()
+        .expect("it moves");
+    assert!(
+        (turn - 0.175).abs() < 0.02,
+        "front legs {turn} cycles later"
+    );
+    // Pasted in the place of the shipped class, with a gesture and the name that edges use.
+    let pasted = gaits["toml"].as_str().expect("text");
+    let pasted = pasted.replace("\"NAME\"", "\"drum\"");
+    let own = format!("name = {}", gaits["name"]);
+    let pasted = pasted.replacen(&own, "name = \"locomotion\"", 1);
+    let text = folder.read("quadruped.toml");
+    let from = text.find("[[class]]").expect("a class");
+    let to = from + text[from..].find("\n]\n").expect("its end") + 3;
+    folder.write(
+        "quadruped.toml",
+        &format!("{}{pasted}{}", &text[..from], &text[to..]),
+    );
+    config::load(Files::Folder(folder.path(".")), "quadruped.toml")
+        .unwrap_or_else(|e| panic!("{e}\n{pasted}"));
+}
+
+#[test]
+fn graph_build_shows_groups_figures_and_plots() {
+    let folder = Folder::of_configs();
+    let shown = build(&folder, &GAITS, &["--out", "plots"]).expect(0).out;
+    for part in [
+        "(cycles, 5 clips)",
+        "bow and heading: warp cost",
+        "[[class]]",
+        ".svg",
+    ] {
+        assert!(shown.contains(part), "no {part:?} in {shown}");
+    }
+    let plots = std::fs::read_dir(folder.path("plots")).expect("a folder of plots");
+    let plot = plots.flatten().next().expect("one class has several clips");
+    let svg = std::fs::read_to_string(plot.path()).expect("text");
+    assert!(
+        svg.starts_with("<svg") && svg.contains("walk_long"),
+        "{svg:.200}"
+    );
+}
+
+#[test]
+fn graph_build_refuses_what_is_no_clip_of_this_body() {
+    let folder = Folder::of_configs();
+    let strange = build(&folder, &["trot_long", "arm_fold"], &[]);
+    refused(strange, 2, &["clips/arm_fold.json", "front_left_hip"]);
+    refused(
+        build(&folder, &["nothing"], &[]),
+        2,
+        &["cannot read clips/nothing.json"],
+    );
+    folder.write("clips/broken.json", "{}");
+    refused(
+        build(&folder, &["broken"], &[]),
+        2,
+        &["clips/broken.json", "not a clip"],
+    );
+    let text = folder
+        .read("clips/trot_long.json")
+        .replace("\"version\": 1", "\"version\": 9");
+    folder.write("clips/newer.json", &text);
+    refused(
+        build(&folder, &["newer"], &[]),
+        2,
+        &["clips/newer.json", "version"],
+    );
 }
