@@ -7,6 +7,12 @@ use crate::motion::weights::MOST_DIMENSIONS;
 type Point = [f64; MOST_DIMENSIONS];
 /// Clips of one simplex at most: one more than parameters.
 const CORNERS: usize = MOST_DIMENSIONS + 1;
+/// Samples at most: a wish looks at each of them.
+const MOST_SAMPLES: usize = 12_000;
+/// Simplices that are tried for one wish, nearest first, until one meets it.
+const TRIES: usize = 4;
+/// A wish is met when this near, as a share of the range.
+const MET: f64 = 2e-3;
 /// Gauss-Newton steps.
 const STEPS: usize = 5;
 
@@ -39,6 +45,18 @@ impl Faces {
         evaluate: &mut impl FnMut(&[f64]) -> Result<Point, InverseError>,
     ) -> Result<Self, InverseError> {
         let corners = examples.min(dimensions + 1);
+        let count = |grid: usize| {
+            choose(examples, corners).saturating_mul(choose(grid + corners - 1, corners - 1))
+        };
+        // Coarser before there are too many; a cubic needs three steps.
+        let grid =
+            (3..=grid)
+                .rev()
+                .find(|g| count(*g) <= MOST_SAMPLES)
+                .ok_or(InverseError::TooMany {
+                    examples,
+                    dimensions,
+                })?;
         let mut low = [f64::INFINITY; MOST_DIMENSIONS];
         let mut high = [f64::NEG_INFINITY; MOST_DIMENSIONS];
         let mut samples = Vec::new();
@@ -109,28 +127,44 @@ impl Faces {
 
     pub(super) fn weights(&self, p: &Point, out: &mut [f64]) {
         let goal: Point = std::array::from_fn(|d| (p[d] - self.low[d]) * self.inverse_span[d]);
-        let mut nearest = (f64::INFINITY, 0);
-        for (i, sample) in self.samples.iter().enumerate() {
-            let d: f64 = (0..MOST_DIMENSIONS)
-                .map(|d| (sample.scaled[d] - goal[d]).powi(2))
-                .sum();
-            if d < nearest.0 {
-                nearest = (d, i);
+        let mut tried = [usize::MAX; TRIES];
+        let mut best = (f64::INFINITY, [0.0; CORNERS], 0);
+        for attempt in 0..TRIES {
+            let mut nearest: (f64, Option<&Sample>) = (f64::INFINITY, None);
+            for sample in &self.samples {
+                let mut sum = 0.0;
+                for d in 0..MOST_DIMENSIONS {
+                    sum += (sample.scaled[d] - goal[d]) * (sample.scaled[d] - goal[d]);
+                }
+                if sum < nearest.0 && !tried.contains(&sample.face) {
+                    nearest = (sum, Some(sample));
+                }
+            }
+            let Some(start) = nearest.1 else { break };
+            tried[attempt] = start.face;
+            let cubic = &self.faces[start.face].1;
+            let (gap, weights) = self.approach(cubic, start.weights, &Vector::from(goal));
+            if gap < best.0 {
+                best = (gap, weights, start.face);
+            }
+            if best.0 < MET {
+                break;
             }
         }
-        // There is at least one sample: one clip at least was asked for.
-        let start = &self.samples[nearest.1];
-        let (clips, cubic) = &self.faces[start.face];
-        let weights = self.approach(cubic, start.weights, &Vector::from(goal));
         out.fill(0.0);
-        for (clip, w) in clips.iter().zip(weights).take(self.corners) {
+        for (clip, w) in self.faces[best.2].0.iter().zip(best.1).take(self.corners) {
             out[*clip] += w;
         }
     }
 
     /// Damped Gauss-Newton steps on the cubic, each projected on the simplex and taken only if it
-    /// comes nearer.
-    fn approach(&self, cubic: &Cubic, start: [f64; CORNERS], goal: &Vector) -> [f64; CORNERS] {
+    /// comes nearer. The distance that is left, and the weights.
+    fn approach(
+        &self,
+        cubic: &Cubic,
+        start: [f64; CORNERS],
+        goal: &Vector,
+    ) -> (f64, [f64; CORNERS]) {
         let variables = self.corners - 1;
         let mut weights = start;
         let mut damping = 1e-6;
@@ -163,8 +197,13 @@ impl Faces {
                 damping = (damping * 100.0).max(1e-3);
             }
         }
-        weights
+        (gap.norm(), weights)
     }
+}
+
+/// Ways to choose `k` of `n`.
+fn choose(n: usize, k: usize) -> usize {
+    (0..k.min(n)).fold(1, |ways: usize, i| ways.saturating_mul(n - i) / (i + 1))
 }
 
 /// The free variables of a simplex: all weights but the first.

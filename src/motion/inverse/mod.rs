@@ -65,6 +65,16 @@ pub enum InverseError {
         /// What was asked for.
         found: usize,
     },
+    /// More combinations of clips than a wish can be compared with.
+    #[error(
+        "{examples} clips and {dimensions} parameters are too many combinations; split the class, or ask for fewer parameters"
+    )]
+    TooMany {
+        /// Number of clips.
+        examples: usize,
+        /// Number of parameters.
+        dimensions: usize,
+    },
     /// The forward function gave something that is no number.
     #[error(
         "parameter {dimension} is {found} at weights {weights:?}; it must be a finite number at every blend"

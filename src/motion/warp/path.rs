@@ -135,11 +135,13 @@ fn extend(
             if a + b == 0 {
                 continue;
             }
-            let mut best = (f64::INFINITY, 0);
-            // The diagonal first: of equal ways it is the straightest.
-            if a > 0 && b > 0 {
-                best = (sums[(a - 1) * columns + b - 1], 3);
-            }
+            // The diagonal first: of equal ways it is the straightest. Costs that are no numbers decide
+            // nothing, but a way there is.
+            let mut best = match (a, b) {
+                (0, _) => (sums[b - 1], 2),
+                (_, 0) => (sums[(a - 1) * columns], 1),
+                _ => (sums[(a - 1) * columns + b - 1], 3),
+            };
             if a > 0 && sums[(a - 1) * columns + b] < best.0 {
                 best = (sums[(a - 1) * columns + b], 1);
             }
@@ -238,6 +240,15 @@ mod tests {
                 let step = (w[1].0 - w[0].0, w[1].1 - w[0].1);
                 prop_assert!([(1, 0), (0, 1), (1, 1)].contains(&step), "step {:?}", step);
             }
+        }
+    }
+
+    #[test]
+    fn costs_that_are_no_numbers_still_give_a_path() {
+        for wrong in [f64::NAN, f64::INFINITY] {
+            let table = CostTable::from_fn(5, 7, |a, b| if a == b { wrong } else { 1.0 });
+            let path = cheapest_path(&table, &[], false).expect("no keys");
+            assert_eq!(path.pairs.last(), Some(&(4, 6)), "{path:?}");
         }
     }
 
