@@ -2,7 +2,7 @@
 
 use super::InverseError;
 use super::cubic::{Cubic, Jacobian, Vector};
-use crate::motion::weights::MOST_DIMENSIONS;
+use crate::motion::weights::{MOST_DIMENSIONS, distance_sq};
 
 type Point = [f64; MOST_DIMENSIONS];
 /// Clips of one simplex at most: one more than parameters.
@@ -132,10 +132,7 @@ impl Faces {
         for attempt in 0..TRIES {
             let mut nearest: (f64, Option<&Sample>) = (f64::INFINITY, None);
             for sample in &self.samples {
-                let mut sum = 0.0;
-                for d in 0..MOST_DIMENSIONS {
-                    sum += (sample.scaled[d] - goal[d]) * (sample.scaled[d] - goal[d]);
-                }
+                let sum = distance_sq(&sample.scaled, &goal);
                 if sum < nearest.0 && !tried.contains(&sample.face) {
                     nearest = (sum, Some(sample));
                 }

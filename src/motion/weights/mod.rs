@@ -11,7 +11,9 @@ mod radial;
 
 pub use parameters::{DIMENSION_NAMES, MOST_DIMENSIONS, Parameters};
 
-use radial::{Radial, distance_sq};
+use radial::Radial;
+
+pub(super) use radial::distance_sq;
 
 /// How weights follow from the place in parameter space.
 #[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
