@@ -3,7 +3,7 @@
 use super::Feet;
 use super::joint_space::body_pose;
 use crate::robot::{Leg, RobotModel};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// Legs of a robot as [`Feet`]. Poses are those of a floating [`super::JointSpace`]: joints, then the
 /// body's place over the ground.
@@ -53,6 +53,12 @@ impl Feet for RobotFeet {
         match leg.place_foot(&self.model, goal, joints) {
             Ok(()) => 0.0,
             Err(_) => (leg.foot_position(&self.model, joints) - goal).norm(),
+        }
+    }
+
+    fn shift(&self, pose: &mut [f64], way: Vector3<f64>) {
+        for (coordinate, way) in pose[self.joints..].iter_mut().zip(way.iter()) {
+            *coordinate += way;
         }
     }
 

@@ -14,6 +14,7 @@ mod layer;
 pub mod map;
 mod motion;
 mod servos;
+pub mod starter;
 
 pub use build::{Character, load};
 pub use error::ConfigError;

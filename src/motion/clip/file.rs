@@ -140,24 +140,35 @@ impl ClipFile {
     /// JSON text, one line per frame, numbers rounded to a micro-radian.
     pub fn to_json(&self) -> String {
         let round = |v: f64| (v * 1e6).round() / 1e6 + 0.0;
+        let rows = |rows: &mut dyn Iterator<Item = &[f64]>| {
+            let rows: Vec<String> = rows
+                .map(|row| {
+                    let numbers: Vec<f64> = row.iter().map(|v| round(*v)).collect();
+                    format!(
+                        "    {}",
+                        serde_json::to_string(&numbers).unwrap_or_default()
+                    )
+                })
+                .collect();
+            format!("[\n{}\n  ]", rows.join(",\n"))
+        };
         let mut head = self.clone();
         head.frames.clear();
+        head.body.clear();
+        head.way.clear();
         let mut text = serde_json::to_string_pretty(&head).unwrap_or_default();
-        let rows: Vec<String> = self
-            .frames
-            .iter()
-            .map(|f| {
-                let numbers: Vec<f64> = f.iter().map(|v| round(*v)).collect();
-                format!(
-                    "    {}",
-                    serde_json::to_string(&numbers).unwrap_or_default()
-                )
-            })
-            .collect();
-        text = text.replace(
-            "\"frames\": []",
-            &format!("\"frames\": [\n{}\n  ]", rows.join(",\n")),
-        );
+        let mut tables = String::new();
+        if !self.body.is_empty() {
+            let body = rows(&mut self.body.iter().map(<[f64; 6]>::as_slice));
+            tables += &format!("\"body\": {body},\n  ");
+        }
+        if !self.way.is_empty() {
+            let way = rows(&mut self.way.iter().map(<[f64; 3]>::as_slice));
+            tables += &format!("\"way\": {way},\n  ");
+        }
+        let frames = rows(&mut self.frames.iter().map(Vec::as_slice));
+        tables += &format!("\"frames\": {frames}");
+        text = text.replace("\"frames\": []", &tables);
         text.push('\n');
         text
     }
