@@ -14,6 +14,7 @@ mod gait_presets;
 mod gait_stance;
 pub mod graph;
 pub mod inertia;
+pub mod inverse;
 pub mod layer;
 mod limbs;
 pub mod mapping;
@@ -22,7 +23,9 @@ pub mod pins;
 pub mod range;
 mod smooth;
 mod spline;
+pub mod suggest;
 pub mod take;
+pub mod warp;
 pub mod weights;
 
 pub use animator::Animator;
