@@ -70,8 +70,8 @@ fn a_leg_of_another_build_is_solved_from_nearby() {
         r#"<origin xyz="0 0 -0.1"/><axis xyz="0.4 1 0.2"/>"#,
     );
     let robot = Robot::from_text("skew", &skew);
-    let mut pose = vec![0.1, 0.7, -1.3].repeat(4);
-    let goals: Vec<_> = foot_points(&robot, &vec![0.0, 0.6, -1.1].repeat(4));
+    let mut pose = [0.1, 0.7, -1.3].repeat(4);
+    let goals: Vec<_> = foot_points(&robot, &[0.0, 0.6, -1.1].repeat(4));
     for (leg, goal) in robot.legs.iter().zip(goals) {
         let left = leg.reach(goal, &mut pose);
         assert!(left < 1e-6, "{}: {left} m left", leg.name);
