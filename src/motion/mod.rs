@@ -10,6 +10,7 @@ pub mod clip;
 pub mod gait;
 pub mod gait_frames;
 mod gait_paths;
+mod gait_plan;
 mod gait_presets;
 mod gait_stance;
 pub mod graph;

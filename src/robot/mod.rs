@@ -7,6 +7,7 @@ pub mod adapt;
 pub mod envelope;
 pub mod kinematics;
 pub mod leg;
+mod limits;
 pub mod model;
 pub mod tip;
 
