@@ -15,6 +15,7 @@ mod limbs;
 pub mod mapping;
 pub mod node;
 pub mod range;
+pub mod search;
 mod smooth;
 mod spline;
 pub mod weights;

@@ -1,0 +1,581 @@
+//! A class as the search sees it: features of its clips on common normalised time, and distances within.
+
+use super::weight_map::{Hat, WeightMap};
+use super::{FRAMES_PER_SECOND, MAX_PARAMETERS, State};
+use crate::base::angle::wrap_pi;
+use std::sync::Arc;
+
+/// What a class is made of, beside its clips.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassSpec {
+    /// Name, for messages and plots.
+    pub name: String,
+    /// Whether time wraps.
+    pub cyclic: bool,
+    /// Frames that every clip is resampled to, at least 2. Of a cyclic class frame k is at `k / frames`,
+    /// of an open one at `k / (frames - 1)`.
+    pub frames: usize,
+    /// `n` of (4.3): points, joints or vertices that a distance is the mean over.
+    pub points: usize,
+    /// Weight of velocities against positions in the distance; velocities are in metres per 1/25 s.
+    pub lambda_v: f64,
+    /// A length of the body that makes a turn of the root a length, metres.
+    pub height_m: f64,
+}
+
+impl ClassSpec {
+    /// A class of this name with 40 frames, distances per feature, `lambda_v = 1`, height 0.3 m.
+    pub fn new(name: &str, cyclic: bool, points: usize) -> Self {
+        Self {
+            name: name.into(),
+            cyclic,
+            frames: 40,
+            points,
+            lambda_v: 1.0,
+            height_m: 0.3,
+        }
+    }
+}
+
+/// One clip as features.
+#[derive(Copy, Clone, Debug)]
+pub struct ClipFeatures<'a> {
+    /// Clip name.
+    pub name: &'a str,
+    /// Length, seconds; of one cycle for a cyclic clip.
+    pub duration_s: f64,
+    /// Features per frame: Euclidean, root-free, metres.
+    pub width: usize,
+    /// Frames x width, evenly over the clip. A cyclic clip does not repeat its first frame at the end.
+    pub positions: &'a [f64],
+    /// Frames x 3: the root on the ground, x and y in metres and yaw in radians; or empty. Only its
+    /// velocity in the body's own frame counts.
+    pub root: &'a [f64],
+    /// One number per frame, not negative, for the penalty term of the cost (nearness of joint limits,
+    /// of self-collision); or empty.
+    pub penalty: &'a [f64],
+}
+
+/// Why features cannot be used.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum FeatureError {
+    /// No clip at all, or another number than the weight map has.
+    #[error("class {class}: {found} clips, the weight map is made for {expected}")]
+    Count {
+        /// Class.
+        class: String,
+        /// Clips given.
+        found: usize,
+        /// Clips needed.
+        expected: usize,
+    },
+    /// A clip without a velocity.
+    #[error("class {class}, clip {clip}: {found} frame(s); a velocity needs at least 2")]
+    TooShort {
+        /// Class.
+        class: String,
+        /// Clip.
+        clip: String,
+        /// Frames given.
+        found: usize,
+    },
+    /// A table of the wrong size.
+    #[error("class {class}, clip {clip}: {what} has {found} numbers, expected {expected}")]
+    Size {
+        /// Class.
+        class: String,
+        /// Clip.
+        clip: String,
+        /// Which table.
+        what: &'static str,
+        /// Numbers given.
+        found: usize,
+        /// Numbers needed.
+        expected: usize,
+    },
+    /// A number that cannot be used.
+    #[error("class {class}, clip {clip}, frame {frame}: {what} is {value}; {allowed}")]
+    Number {
+        /// Class.
+        class: String,
+        /// Clip.
+        clip: String,
+        /// Frame.
+        frame: usize,
+        /// Which number.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// A number of the class itself.
+    #[error("class {class}: {what} is {value}; {allowed}")]
+    Spec {
+        /// Class.
+        class: String,
+        /// Which number.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// Two classes whose poses cannot be compared.
+    #[error(
+        "classes {source_class} and {target_class} differ in {what} ({source_value} and {target_value}); embed both in the same way"
+    )]
+    Unlike {
+        /// Source class.
+        source_class: String,
+        /// Target class.
+        target_class: String,
+        /// In what they differ.
+        what: &'static str,
+        /// Of the source.
+        source_value: f64,
+        /// Of the target.
+        target_value: f64,
+    },
+}
+
+/// A class ready to be searched. Share it between edges with an [`Arc`].
+pub struct SearchClass {
+    /// Class name.
+    pub name: String,
+    /// Whether time wraps.
+    pub cyclic: bool,
+    /// Names of the clips or references.
+    pub clips: Vec<String>,
+    map: Arc<dyn WeightMap>,
+    frames: usize,
+    durations_s: Vec<f64>,
+    /// References x frames x width: `[x; sqrt(lambda_v) s] / sqrt(n)`, so that d is a squared distance.
+    features: Vec<f64>,
+    width: usize,
+    spec: (f64, f64),
+    /// Frames x references.
+    penalty: Vec<f64>,
+    /// Frames x references x references: squared distances at one time, and to the next frame.
+    within: Vec<f64>,
+    next: Vec<f64>,
+}
+
+/// A time between two frames.
+#[derive(Copy, Clone, Debug)]
+pub(super) struct Between {
+    pub(super) frame: usize,
+    pub(super) next: usize,
+    /// Weight of the next frame.
+    pub(super) part: f64,
+}
+
+impl SearchClass {
+    /// Resamples `clips`, adds velocities and measures all distances within the class.
+    ///
+    /// Velocities are backward differences, so frame 0 looks across the seam of a cyclic clip and
+    /// forwards in an open one; the root's is always forwards at frame 0, since it does not come back.
+    ///
+    /// # Errors
+    /// No or too short clips, wrong sizes, numbers that are not finite.
+    pub fn new(
+        spec: &ClassSpec,
+        clips: &[ClipFeatures<'_>],
+        map: Arc<dyn WeightMap>,
+    ) -> Result<Self, FeatureError> {
+        check(spec, clips, map.as_ref())?;
+        let (n, frames) = (clips.len(), spec.frames);
+        let positions = clips[0].width;
+        let rooted = !clips[0].root.is_empty();
+        let width = 2 * positions + if rooted { 3 } else { 0 };
+        let mut class = Self {
+            name: spec.name.clone(),
+            cyclic: spec.cyclic,
+            clips: clips.iter().map(|c| c.name.to_owned()).collect(),
+            map,
+            frames,
+            durations_s: clips.iter().map(|c| c.duration_s).collect(),
+            features: Vec::with_capacity(n * frames * width),
+            width,
+            spec: (spec.lambda_v, spec.points as f64),
+            penalty: vec![0.0; frames * n],
+            within: vec![0.0; frames * n * n],
+            next: vec![0.0; frames * n * n],
+        };
+        for (index, clip) in clips.iter().enumerate() {
+            class.add_features(spec, clip);
+            if !clip.penalty.is_empty() {
+                let penalty = resample(clip.penalty, 1, frames, spec.cyclic);
+                for (k, value) in penalty.into_iter().enumerate() {
+                    class.penalty[k * n + index] = value;
+                }
+            }
+        }
+        for k in 0..frames {
+            for i in 0..n {
+                for j in 0..n {
+                    let at = (k * n + i) * n + j;
+                    class.within[at] = squared(class.feature(i, k), class.feature(j, k));
+                    let following = (k + 1) % frames;
+                    class.next[at] = squared(class.feature(i, k), class.feature(j, following));
+                }
+            }
+        }
+        Ok(class)
+    }
+
+    /// A class whose blend is not linear: references at `steps` steps per parameter are synthesised by
+    /// `pose(parameters, t, features)` (`width` features) with `duration_s(parameters)`; between them
+    /// the search blends linearly (the hybrid blend of section 3.3.3).
+    ///
+    /// # Errors
+    /// As [`SearchClass::new`].
+    pub fn subdivided(
+        spec: &ClassSpec,
+        parameters: usize,
+        steps: usize,
+        width: usize,
+        duration_s: &dyn Fn(&[f64]) -> f64,
+        pose: &mut dyn FnMut(&[f64], f64, &mut [f64]),
+    ) -> Result<Self, FeatureError> {
+        let hat = Hat::new(parameters, steps);
+        let mut made = Vec::new();
+        for index in 0..hat.references() {
+            let place = hat.place(index);
+            let place = &place[..hat.parameters()];
+            let mut positions = vec![0.0; spec.frames * width];
+            for (k, out) in positions.chunks_exact_mut(width.max(1)).enumerate() {
+                pose(place, time_of(k, spec.frames, spec.cyclic), out);
+            }
+            let values: Vec<String> = place.iter().map(|v| format!("{v:.3}")).collect();
+            let name = format!("{}({})", spec.name, values.join(","));
+            made.push((name, duration_s(place), positions));
+        }
+        let clips: Vec<ClipFeatures<'_>> = made
+            .iter()
+            .map(|(name, duration_s, positions)| ClipFeatures {
+                name,
+                duration_s: *duration_s,
+                width,
+                positions,
+                root: &[],
+                penalty: &[],
+            })
+            .collect();
+        Self::new(spec, &clips, Arc::new(hat))
+    }
+
+    fn add_features(&mut self, spec: &ClassSpec, clip: &ClipFeatures<'_>) {
+        let (frames, m) = (spec.frames, clip.width);
+        let positions = resample(clip.positions, m, frames, spec.cyclic);
+        // From one frame to the next, in frames of 1/25 s.
+        let steps = if spec.cyclic { frames } else { frames - 1 };
+        let per_frame = steps as f64 / (clip.duration_s * FRAMES_PER_SECOND);
+        let scale = 1.0 / (spec.points as f64).sqrt();
+        let velocity_scale = scale * spec.lambda_v.sqrt() * per_frame;
+        let root = resample_root(clip.root, frames, spec.cyclic);
+        for k in 0..frames {
+            let row = &positions[k * m..(k + 1) * m];
+            self.features.extend(row.iter().map(|x| x * scale));
+            let (from, to) = match k {
+                0 if spec.cyclic => (frames - 1, 0),
+                0 => (0, 1),
+                _ => (k - 1, k),
+            };
+            for d in 0..m {
+                let step = positions[to * m + d] - positions[from * m + d];
+                self.features.push(step * velocity_scale);
+            }
+            if !root.is_empty() {
+                let (from, to) = if k == 0 { (0, 1) } else { (k - 1, k) };
+                let [x, y, yaw] = [0, 1, 2].map(|d| root[3 * to + d] - root[3 * from + d]);
+                let (sin, cos) = root[3 * from + 2].sin_cos();
+                let body = [cos * x + sin * y, cos * y - sin * x, yaw * spec.height_m];
+                // The root weighs as much as all points together, which all move with it.
+                let weight = velocity_scale * (spec.points as f64).sqrt();
+                self.features.extend(body.map(|v| v * weight));
+            }
+        }
+    }
+
+    /// Number of free parameters.
+    pub fn parameters(&self) -> usize {
+        self.map.parameters()
+    }
+
+    /// Number of clips or references.
+    pub fn references(&self) -> usize {
+        self.durations_s.len()
+    }
+
+    /// Frames per clip.
+    pub fn frames(&self) -> usize {
+        self.frames
+    }
+
+    /// Normalised time of a frame.
+    pub fn time_of(&self, frame: usize) -> f64 {
+        time_of(frame, self.frames, self.cyclic)
+    }
+
+    /// Blend weights at `state`, into `out`.
+    pub fn weights(&self, state: &State, out: &mut [f64]) {
+        self.map
+            .weights(&state.parameters[..self.parameters()], out);
+    }
+
+    /// Stacked features of reference `index` at `frame`: their squared distance is `d` of (4.3).
+    pub fn feature(&self, index: usize, frame: usize) -> &[f64] {
+        let at = (index * self.frames + frame) * self.width;
+        &self.features[at..at + self.width]
+    }
+
+    /// Numbers in [`SearchClass::feature`].
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Length of the blend, seconds: `T(w) = sum w_i T_i`.
+    pub fn duration_s(&self, weights: &[f64]) -> f64 {
+        self.durations_s.iter().zip(weights).map(|(t, w)| t * w).sum()
+    }
+
+    /// Stacked features of the linear blend at any state, into `out`. For tests and plots; the search
+    /// itself needs distances only.
+    pub fn blend(&self, state: &State, out: &mut [f64]) {
+        let mut weights = vec![0.0; self.references()];
+        self.weights(state, &mut weights);
+        let at = self.between(state.t);
+        out.fill(0.0);
+        for (i, w) in weights.iter().enumerate() {
+            let (a, b) = (self.feature(i, at.frame), self.feature(i, at.next));
+            for ((out, a), b) in out.iter_mut().zip(a).zip(b) {
+                *out += w * ((1.0 - at.part) * a + at.part * b);
+            }
+        }
+    }
+
+    /// The frames around `t`.
+    pub(super) fn between(&self, t: f64) -> Between {
+        if self.cyclic {
+            let at = t.rem_euclid(1.0) * self.frames as f64;
+            let frame = (at.floor() as usize).min(self.frames - 1);
+            Between {
+                frame,
+                next: (frame + 1) % self.frames,
+                part: (at - frame as f64).clamp(0.0, 1.0),
+            }
+        } else {
+            let at = t.clamp(0.0, 1.0) * (self.frames - 1) as f64;
+            let frame = (at.floor() as usize).min(self.frames - 2);
+            Between {
+                frame,
+                next: frame + 1,
+                part: (at - frame as f64).clamp(0.0, 1.0),
+            }
+        }
+    }
+
+    /// Squared distances at one frame, references x references.
+    pub(super) fn within(&self, frame: usize) -> &[f64] {
+        let n = self.references();
+        &self.within[frame * n * n..(frame + 1) * n * n]
+    }
+
+    /// Squared distances from a frame to the one after it, references x references.
+    pub(super) fn to_next(&self, frame: usize) -> &[f64] {
+        let n = self.references();
+        &self.next[frame * n * n..(frame + 1) * n * n]
+    }
+
+    pub(super) fn penalty(&self, frame: usize) -> &[f64] {
+        let n = self.references();
+        &self.penalty[frame * n..(frame + 1) * n]
+    }
+
+    /// Whether distances to `other` mean anything.
+    pub(super) fn comparable(&self, other: &Self) -> Result<(), FeatureError> {
+        let checks = [
+            ("features", self.width as f64, other.width as f64),
+            ("lambda_v", self.spec.0, other.spec.0),
+            ("points", self.spec.1, other.spec.1),
+        ];
+        for (what, source_value, target_value) in checks {
+            if source_value != target_value {
+                return Err(FeatureError::Unlike {
+                    source_class: self.name.clone(),
+                    target_class: other.name.clone(),
+                    what,
+                    source_value,
+                    target_value,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl std::fmt::Debug for SearchClass {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SearchClass")
+            .field("name", &self.name)
+            .field("clips", &self.clips)
+            .field("frames", &self.frames)
+            .finish_non_exhaustive()
+    }
+}
+
+pub(super) fn squared(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+fn time_of(frame: usize, frames: usize, cyclic: bool) -> f64 {
+    let steps = if cyclic { frames } else { frames - 1 };
+    frame as f64 / steps as f64
+}
+
+/// Linear interpolation of rows of `width` to `frames` frames.
+fn resample(rows: &[f64], width: usize, frames: usize, cyclic: bool) -> Vec<f64> {
+    let count = rows.len() / width.max(1);
+    let steps = if cyclic { count } else { count - 1 };
+    let mut out = Vec::with_capacity(frames * width);
+    for k in 0..frames {
+        let at = time_of(k, frames, cyclic) * steps as f64;
+        let from = (at.floor() as usize).min(count - 1);
+        let to = if cyclic {
+            (from + 1) % count
+        } else {
+            (from + 1).min(count - 1)
+        };
+        let part = at - from as f64;
+        for d in 0..width {
+            out.push((1.0 - part) * rows[from * width + d] + part * rows[to * width + d]);
+        }
+    }
+    out
+}
+
+/// The root's track resampled as an open one, yaw without turns; a cyclic clip's last frame is one step
+/// before its end.
+fn resample_root(root: &[f64], frames: usize, cyclic: bool) -> Vec<f64> {
+    if root.is_empty() {
+        return Vec::new();
+    }
+    let mut track = root.to_vec();
+    let count = track.len() / 3;
+    for k in 1..count {
+        let step = wrap_pi(root[3 * k + 2] - root[3 * k - 1]);
+        track[3 * k + 2] = track[3 * k - 1] + step;
+    }
+    if !cyclic {
+        return resample(&track, 3, frames, false);
+    }
+    // Goes on beyond the last frame as it went on up to it.
+    for d in 0..3 {
+        track.push(2.0 * track[3 * (count - 1) + d] - track[3 * (count - 2) + d]);
+    }
+    let mut out = resample(&track, 3, frames + 1, false);
+    out.truncate(3 * frames);
+    out
+}
+
+fn check(
+    spec: &ClassSpec,
+    clips: &[ClipFeatures<'_>],
+    map: &dyn WeightMap,
+) -> Result<(), FeatureError> {
+    let class = || spec.name.clone();
+    let numbers = [
+        ("frames", spec.frames as f64, 2.0, "at least 2"),
+        ("points", spec.points as f64, 1.0, "at least 1"),
+        ("lambda_v", spec.lambda_v, 0.0, "not negative and finite"),
+        ("height_m", spec.height_m, 0.0, "not negative and finite"),
+    ];
+    for (what, value, least, allowed) in numbers {
+        if !(value >= least && value.is_finite()) {
+            return Err(FeatureError::Spec {
+                class: class(),
+                what,
+                value,
+                allowed,
+            });
+        }
+    }
+    if map.parameters() > MAX_PARAMETERS {
+        return Err(FeatureError::Spec {
+            class: class(),
+            what: "number of parameters",
+            value: map.parameters() as f64,
+            allowed: "at most 4",
+        });
+    }
+    if clips.is_empty() || clips.len() != map.references() {
+        return Err(FeatureError::Count {
+            class: class(),
+            found: clips.len(),
+            expected: map.references(),
+        });
+    }
+    for clip in clips {
+        check_clip(spec, clip, &clips[0])?;
+    }
+    Ok(())
+}
+
+fn check_clip(
+    spec: &ClassSpec,
+    clip: &ClipFeatures<'_>,
+    first: &ClipFeatures<'_>,
+) -> Result<(), FeatureError> {
+    let size = |what, found, expected| FeatureError::Size {
+        class: spec.name.clone(),
+        clip: clip.name.to_owned(),
+        what,
+        found,
+        expected,
+    };
+    let number = |frame, what, value, allowed| FeatureError::Number {
+        class: spec.name.clone(),
+        clip: clip.name.to_owned(),
+        frame,
+        what,
+        value,
+        allowed,
+    };
+    if clip.width == 0 || clip.width != first.width {
+        return Err(size("a frame", clip.width, first.width.max(1)));
+    }
+    let frames = clip.positions.len() / clip.width;
+    if clip.positions.len() != frames * clip.width {
+        return Err(size("positions", clip.positions.len(), (frames + 1) * clip.width));
+    }
+    if frames < 2 {
+        return Err(FeatureError::TooShort {
+            class: spec.name.clone(),
+            clip: clip.name.to_owned(),
+            found: frames,
+        });
+    }
+    let rooted = !first.root.is_empty();
+    if clip.root.len() != if rooted { 3 * frames } else { 0 } {
+        return Err(size("root", clip.root.len(), if rooted { 3 * frames } else { 0 }));
+    }
+    if !clip.penalty.is_empty() && clip.penalty.len() != frames {
+        return Err(size("penalty", clip.penalty.len(), frames));
+    }
+    if !(clip.duration_s > 0.0 && clip.duration_s.is_finite()) {
+        return Err(number(0, "duration_s", clip.duration_s, "above 0 and finite"));
+    }
+    let tables = [
+        ("a feature", clip.positions, clip.width, f64::NEG_INFINITY),
+        ("the root", clip.root, 3, f64::NEG_INFINITY),
+        ("the penalty", clip.penalty, 1, 0.0),
+    ];
+    for (what, table, width, least) in tables {
+        if let Some(at) = table.iter().position(|v| !(v.is_finite() && *v >= least)) {
+            let allowed = if least == 0.0 { "finite, not negative" } else { "finite" };
+            return Err(number(at / width, what, table[at], allowed));
+        }
+    }
+    Ok(())
+}
