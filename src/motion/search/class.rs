@@ -337,7 +337,11 @@ impl SearchClass {
 
     /// Length of the blend, seconds: `T(w) = sum w_i T_i`.
     pub fn duration_s(&self, weights: &[f64]) -> f64 {
-        self.durations_s.iter().zip(weights).map(|(t, w)| t * w).sum()
+        self.durations_s
+            .iter()
+            .zip(weights)
+            .map(|(t, w)| t * w)
+            .sum()
     }
 
     /// Stacked features of the linear blend at any state, into `out`. For tests and plots; the search
@@ -547,7 +551,11 @@ fn check_clip(
     }
     let frames = clip.positions.len() / clip.width;
     if clip.positions.len() != frames * clip.width {
-        return Err(size("positions", clip.positions.len(), (frames + 1) * clip.width));
+        return Err(size(
+            "positions",
+            clip.positions.len(),
+            (frames + 1) * clip.width,
+        ));
     }
     if frames < 2 {
         return Err(FeatureError::TooShort {
@@ -558,13 +566,22 @@ fn check_clip(
     }
     let rooted = !first.root.is_empty();
     if clip.root.len() != if rooted { 3 * frames } else { 0 } {
-        return Err(size("root", clip.root.len(), if rooted { 3 * frames } else { 0 }));
+        return Err(size(
+            "root",
+            clip.root.len(),
+            if rooted { 3 * frames } else { 0 },
+        ));
     }
     if !clip.penalty.is_empty() && clip.penalty.len() != frames {
         return Err(size("penalty", clip.penalty.len(), frames));
     }
     if !(clip.duration_s > 0.0 && clip.duration_s.is_finite()) {
-        return Err(number(0, "duration_s", clip.duration_s, "above 0 and finite"));
+        return Err(number(
+            0,
+            "duration_s",
+            clip.duration_s,
+            "above 0 and finite",
+        ));
     }
     let tables = [
         ("a feature", clip.positions, clip.width, f64::NEG_INFINITY),
@@ -573,7 +590,11 @@ fn check_clip(
     ];
     for (what, table, width, least) in tables {
         if let Some(at) = table.iter().position(|v| !(v.is_finite() && *v >= least)) {
-            let allowed = if least == 0.0 { "finite, not negative" } else { "finite" };
+            let allowed = if least == 0.0 {
+                "finite, not negative"
+            } else {
+                "finite"
+            };
             return Err(number(at / width, what, table[at], allowed));
         }
     }

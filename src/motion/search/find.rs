@@ -416,11 +416,7 @@ impl Search {
     /// Squared distance of two nodes without what the bound adds.
     fn distance(&mut self, s: usize, cell_s: usize, d: usize, cell_d: usize) -> f64 {
         let at = self.block_at(s, d);
-        row_times(
-            self.from.weights(cell_s),
-            &self.blocks[at],
-            &mut self.row,
-        );
+        row_times(self.from.weights(cell_s), &self.blocks[at], &mut self.row);
         self.distance_from_row(s, cell_s, d, cell_d)
     }
 
@@ -503,7 +499,9 @@ impl Search {
                 continue;
             }
             // The wider ball is divided; two leaves are visited.
-            let divide_a = a.child.filter(|_| b.child.is_none() || a.radius >= b.radius);
+            let divide_a = a
+                .child
+                .filter(|_| b.child.is_none() || a.radius >= b.radius);
             match (divide_a, b.child) {
                 (Some(child), _) => {
                     self.stack.push((child, at_b));
@@ -561,9 +559,7 @@ impl Search {
             cell = self.to.before(row, cell);
             row -= 1;
         }
-        let distance = self.distance(s, cell_s, d, cell_d)
-            + self.from.extra[a]
-            + self.to.extra[b];
+        let distance = self.distance(s, cell_s, d, cell_d) + self.from.extra[a] + self.to.extra[b];
         let similarity = self.tables.similarity_of(distance);
         let latency = self.options.lambda * FRAMES_PER_SECOND * latency_s;
         let dissimilar = self.distance_weight() * distance;

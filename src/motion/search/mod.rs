@@ -35,9 +35,7 @@ pub mod weight_map;
 
 pub use calibrate::{Calibration, calibrate};
 pub use class::{ClassSpec, ClipFeatures, FeatureError, SearchClass};
-pub use find::{
-    Cost, Found, NoTransition, OptionsError, Search, SearchOptions, Target, Waypoint,
-};
+pub use find::{Cost, Found, NoTransition, OptionsError, Search, SearchOptions, Target, Waypoint};
 pub use stored::{StoredFound, StoredPoint, StoredTransitions};
 pub use tables::{DistanceTables, Form};
 pub use weight_map::{Hat, RbfMap, WeightMap};
