@@ -6,8 +6,8 @@ mod support;
 use handwave::base::random::SplitMix;
 use handwave::motion::search::{
     ClassSpec, ClipFeatures, DistanceTables, FeatureError, Form, Found, Hat, NoTransition,
-    OptionsError, Search, SearchClass, SearchOptions, State, StoredTransitions, Target, calibrate,
-    calibrate::random_requests,
+    OptionsError, Search, SearchClass, SearchOptions, State, StoredTransitions, Synthesis, Target,
+    calibrate, calibrate::random_requests,
 };
 use search_support::{class, motion, over, search, state, tenths};
 use std::f64::consts::PI;
@@ -214,18 +214,34 @@ fn the_bound_holds_for_convex_weights_and_the_exact_form_for_all() {
     );
 }
 
+/// A boom that swings in a plane; its parameter bends it by up to 90 degrees, along an arc.
+struct Boom {
+    length: f64,
+    mount: f64,
+}
+
+impl Synthesis for Boom {
+    fn width(&self) -> usize {
+        2
+    }
+
+    fn duration_s(&self, _: &[f64]) -> f64 {
+        1.0
+    }
+
+    fn features(&self, p: &[f64], t: f64, out: &mut [f64]) {
+        let angle = 0.5 * PI * p[0] + 0.3 * (2.0 * PI * t).sin();
+        out[0] = self.length * angle.cos() + self.mount;
+        out[1] = self.length * angle.sin() + self.mount;
+    }
+}
+
 #[test]
 fn in_between_references_bring_the_similarity_to_that_of_curved_blends() {
-    // A boom that swings; its parameter bends it by up to 90 degrees, along an arc. The source's is
-    // 0.5 m long, the target's 0.2 m and mounted elsewhere.
+    // The source's boom is 0.5 m long, the target's 0.2 m and mounted elsewhere.
     let spec = ClassSpec::new("boom", true, 1);
     let class = |steps: usize, length: f64, mount: f64| {
-        let mut pose = |p: &[f64], t: f64, out: &mut [f64]| {
-            let angle = 0.5 * PI * p[0] + 0.3 * (2.0 * PI * t).sin();
-            out[0] = length * angle.cos() + mount;
-            out[1] = length * angle.sin() + mount;
-        };
-        SearchClass::subdivided(&spec, 1, steps, 2, &|_| 1.0, &mut pose).expect("good")
+        SearchClass::subdivided(&spec, 1, steps, &Boom { length, mount }).expect("good")
     };
     // The truth: so many references that nothing is left to interpolate.
     let (fine_a, fine_b) = (class(64, 0.5, 0.0), class(64, 0.2, 0.4));

@@ -56,6 +56,29 @@ pub struct ClipFeatures<'a> {
     pub penalty: &'a [f64],
 }
 
+/// A blend that is not linear in the features, to be sampled at references.
+pub trait Synthesis {
+    /// Features per frame.
+    fn width(&self) -> usize;
+
+    /// Length of the motion at `parameters`, seconds.
+    fn duration_s(&self, parameters: &[f64]) -> f64;
+
+    /// Features at normalised time `t` (0..1), into `out`.
+    fn features(&self, parameters: &[f64], t: f64, out: &mut [f64]);
+
+    /// The root on the ground at `t`: x and y in metres, yaw in radians; `None` for a body without.
+    fn root(&self, _parameters: &[f64], _t: f64) -> Option<[f64; 3]> {
+        None
+    }
+
+    /// A name for the motion at `parameters`.
+    fn name(&self, parameters: &[f64]) -> String {
+        let values: Vec<String> = parameters.iter().map(|v| format!("{v:.2}")).collect();
+        format!("({})", values.join(", "))
+    }
+}
+
 /// Why features cannot be used.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum FeatureError {
@@ -224,9 +247,9 @@ impl SearchClass {
         Ok(class)
     }
 
-    /// A class whose blend is not linear: references at `steps` steps per parameter are synthesised by
-    /// `pose(parameters, t, features)` (`width` features) with `duration_s(parameters)`; between them
-    /// the search blends linearly (the hybrid blend of section 3.3.3).
+    /// A class whose blend is not linear: references at `steps` steps per parameter are synthesised;
+    /// between them the search blends linearly (the hybrid blend of section 3.3.3). With one step the
+    /// references are the corners.
     ///
     /// # Errors
     /// As [`SearchClass::new`].
@@ -234,31 +257,36 @@ impl SearchClass {
         spec: &ClassSpec,
         parameters: usize,
         steps: usize,
-        width: usize,
-        duration_s: &dyn Fn(&[f64]) -> f64,
-        pose: &mut dyn FnMut(&[f64], f64, &mut [f64]),
+        motion: &dyn Synthesis,
     ) -> Result<Self, FeatureError> {
         let hat = Hat::new(parameters, steps);
+        let width = motion.width();
         let mut made = Vec::new();
         for index in 0..hat.references() {
             let place = hat.place(index);
             let place = &place[..hat.parameters()];
             let mut positions = vec![0.0; spec.frames * width];
+            let mut root = Vec::new();
             for (k, out) in positions.chunks_exact_mut(width.max(1)).enumerate() {
-                pose(place, time_of(k, spec.frames, spec.cyclic), out);
+                let t = time_of(k, spec.frames, spec.cyclic);
+                motion.features(place, t, out);
+                root.extend(motion.root(place, t).into_iter().flatten());
             }
-            let values: Vec<String> = place.iter().map(|v| format!("{v:.3}")).collect();
-            let name = format!("{}({})", spec.name, values.join(","));
-            made.push((name, duration_s(place), positions));
+            made.push((
+                motion.name(place),
+                motion.duration_s(place),
+                positions,
+                root,
+            ));
         }
         let clips: Vec<ClipFeatures<'_>> = made
             .iter()
-            .map(|(name, duration_s, positions)| ClipFeatures {
+            .map(|(name, duration_s, positions, root)| ClipFeatures {
                 name,
                 duration_s: *duration_s,
                 width,
                 positions,
-                root: &[],
+                root,
                 penalty: &[],
             })
             .collect();

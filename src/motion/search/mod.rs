@@ -27,6 +27,7 @@ mod blocks;
 pub mod calibrate;
 pub mod class;
 pub mod find;
+pub mod robot;
 mod side;
 pub mod stored;
 pub mod tables;
@@ -34,7 +35,7 @@ mod tree;
 pub mod weight_map;
 
 pub use calibrate::{Calibration, calibrate};
-pub use class::{ClassSpec, ClipFeatures, FeatureError, SearchClass};
+pub use class::{ClassSpec, ClipFeatures, FeatureError, SearchClass, Synthesis};
 pub use find::{Cost, Found, NoTransition, OptionsError, Search, SearchOptions, Target, Waypoint};
 pub use stored::{StoredFound, StoredPoint, StoredTransitions};
 pub use tables::{DistanceTables, Form};

@@ -1,0 +1,306 @@
+//! Classes of a robot's clips for the search: joint positions as lengths, and the animator's blend.
+
+use super::class::{ClassSpec, FeatureError, SearchClass, Synthesis};
+use crate::motion::class::{ClassError, Example};
+use crate::motion::clip::{Clip, ClipKind};
+use crate::motion::limbs::timelines;
+use crate::motion::weights::{Parameters, Weights};
+use crate::robot::RobotModel;
+use crate::robot::model::JointKind;
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+
+/// Seconds from the beginning to the end of a path, which itself has no duration.
+pub const PATH_S: f64 = 1.0;
+/// Lever arm of a joint that moves no other link's origin, metres.
+const LEAST_LEVER_M: f64 = 0.02;
+
+/// Why a class of clips cannot be searched.
+#[derive(Debug, thiserror::Error)]
+pub enum ClipsError {
+    /// No moving clip, or clips that do not fit together.
+    #[error(transparent)]
+    Class(#[from] ClassError),
+    /// Features that cannot be used.
+    #[error(transparent)]
+    Features(#[from] FeatureError),
+    /// Nothing to blend.
+    #[error("class {class}: no clip with an amplitude above 0; nothing to make a transition to")]
+    NothingMoves {
+        /// Class.
+        class: String,
+    },
+}
+
+/// Lever arm of every moving joint, metres: the largest distance of a link's origin below it from its
+/// axis, all joints at zero. A joint position times this is a length, so that distances of poses are in
+/// metres and comparable between bodies; 1 for prismatic joints.
+pub fn lever_arms(model: &RobotModel) -> Vec<f64> {
+    let zero = vec![0.0; model.actuated.len()];
+    let mut levers = Vec::with_capacity(zero.len());
+    for j in &model.actuated {
+        let joint = &model.joints[*j];
+        if joint.kind == JointKind::Prismatic {
+            levers.push(1.0);
+            continue;
+        }
+        let frame = model.link_pose(joint.child, &zero);
+        let axis = frame.rotation * joint.axis.into_inner();
+        let mut lever = LEAST_LEVER_M;
+        for link in 0..model.links.len() {
+            let mut at = link;
+            while let Some(above) = model.parent_joint[at] {
+                if above == *j {
+                    let place = model.link_pose(link, &zero).translation.vector;
+                    let arm: Vector3<f64> = place - frame.translation.vector;
+                    lever = lever.max(arm.cross(&axis).norm());
+                    break;
+                }
+                at = model.joints[above].parent;
+            }
+        }
+        levers.push(lever);
+    }
+    levers
+}
+
+/// A class of clips as the animator blends it: common phase, every limb with its own timeline.
+///
+/// Parameters are, in this order and as far as the clips have more than one value: amplitude,
+/// frequency, and the amount of an added path (crouch). Clips at amplitude 0 are left out: between rest and
+/// the smallest moving clip motion only grows.
+#[derive(Clone, Debug)]
+pub struct ClipBlend {
+    name: String,
+    kind: ClipKind,
+    clips: Vec<Clip>,
+    weights: Weights,
+    low: Parameters,
+    high: Parameters,
+    free: Vec<usize>,
+    limb_of: Vec<Option<usize>>,
+    offsets: Vec<Option<Vec<f64>>>,
+    levers: Vec<f64>,
+    added: Option<Clip>,
+}
+
+impl ClipBlend {
+    /// A class of `examples`; `levers` as from [`lever_arms`], in joint order.
+    ///
+    /// # Errors
+    /// No moving clip; clips whose parameters or limbs do not fit together.
+    pub fn new(name: &str, examples: &[Example], levers: &[f64]) -> Result<Self, ClipsError> {
+        let nothing = || ClipsError::NothingMoves { class: name.into() };
+        let moving: Vec<&Example> = examples.iter().filter(|e| e.parameters[0] > 0.0).collect();
+        let first = moving.first().ok_or_else(nothing)?;
+        let kind = first.clip.kind;
+        let parameters: Vec<Parameters> = moving.iter().map(|e| e.parameters).collect();
+        let weights = Weights::new(&parameters).map_err(|source| ClassError::Weights {
+            class: name.into(),
+            source,
+        })?;
+        let clips: Vec<&Clip> = moving.iter().map(|e| &e.clip).collect();
+        let (limb_of, offsets) = timelines(name, &clips, first.clip.joints())?;
+        let (mut low, mut high) = (parameters[0], parameters[0]);
+        for p in &parameters {
+            for d in 0..2 {
+                low[d] = low[d].min(p[d]);
+                high[d] = high[d].max(p[d]);
+            }
+        }
+        if kind == ClipKind::Path {
+            // Progression is time here, and paths have no frequency.
+            (low, high) = ([1.0, 0.0], [1.0, 0.0]);
+        }
+        Ok(Self {
+            name: name.into(),
+            kind,
+            clips: clips.into_iter().cloned().collect(),
+            weights,
+            free: (0..2).filter(|d| high[*d] > low[*d]).collect(),
+            low,
+            high,
+            limb_of,
+            offsets,
+            levers: levers.to_vec(),
+            added: None,
+        })
+    }
+
+    /// The same at full amplitude only.
+    #[must_use]
+    pub fn at_full_amplitude(mut self) -> Self {
+        self.low[0] = self.high[0];
+        self.free.retain(|d| *d != 0);
+        self
+    }
+
+    /// The same with a path added on top, as a layer is; its amount is a further parameter.
+    #[must_use]
+    pub fn with_added(mut self, path: Clip) -> Self {
+        self.added = Some(path);
+        self
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.free.len() + usize::from(self.added.is_some())
+    }
+
+    /// Names of the clips.
+    pub fn clip_names(&self) -> Vec<&str> {
+        let added = self.added.iter().map(|c| c.name.as_str());
+        self.clips
+            .iter()
+            .map(|c| c.name.as_str())
+            .chain(added)
+            .collect()
+    }
+
+    /// Names of the parameters with their ranges.
+    pub fn parameter_names(&self) -> Vec<String> {
+        let named = self.free.iter().map(|d| match d {
+            0 => format!("amplitude {:.2}..{:.2}", self.low[0], self.high[0]),
+            _ => format!("frequency {:.2}..{:.2} Hz", self.low[1], self.high[1]),
+        });
+        let added = self.added.iter().map(|c| format!("{} 0..1", c.name));
+        named.chain(added).collect()
+    }
+
+    /// Amplitude and frequency at normalised parameters.
+    pub fn wish(&self, parameters: &[f64]) -> Parameters {
+        let mut wish = self.low;
+        for (d, p) in self.free.iter().zip(parameters) {
+            wish[*d] += p * (self.high[*d] - self.low[*d]);
+        }
+        wish
+    }
+
+    /// Normalised parameters (0..1) of an amplitude and a frequency, into `out`; an added path is 0.
+    pub fn normalised(&self, wish: Parameters, out: &mut [f64]) {
+        out.fill(0.0);
+        for (d, out) in self.free.iter().zip(out) {
+            *out = ((wish[*d] - self.low[*d]) / (self.high[*d] - self.low[*d])).clamp(0.0, 1.0);
+        }
+    }
+
+    /// The class for the search, with references at `steps` steps per parameter and `frames` frames.
+    ///
+    /// # Errors
+    /// Features that cannot be used.
+    pub fn search_class(
+        &self,
+        frames: usize,
+        steps: usize,
+        height_m: f64,
+    ) -> Result<SearchClass, FeatureError> {
+        let cyclic = self.kind == ClipKind::Cycle;
+        let spec = ClassSpec {
+            frames,
+            height_m,
+            ..ClassSpec::new(&self.name, cyclic, self.levers.len())
+        };
+        SearchClass::subdivided(&spec, self.parameters(), steps, self)
+    }
+
+    /// Weights of the clips.
+    fn clip_weights(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut weights = vec![0.0; self.clips.len()];
+        self.weights.at(self.wish(parameters), &mut weights);
+        weights
+    }
+
+    /// Joint positions at `t`, blended as in the animator's steady state.
+    fn pose(&self, parameters: &[f64], t: f64, out: &mut [f64]) {
+        let weights = self.clip_weights(parameters);
+        let limbs = self
+            .offsets
+            .iter()
+            .flatten()
+            .map(Vec::len)
+            .max()
+            .unwrap_or(0);
+        let timeline: Vec<f64> = (0..limbs)
+            .map(|limb| {
+                let (mut sin, mut cos) = (0.0, 0.0);
+                for (offsets, weight) in self.offsets.iter().zip(&weights) {
+                    if let Some(offsets) = offsets {
+                        sin += weight * offsets[limb].sin();
+                        cos += weight * offsets[limb].cos();
+                    }
+                }
+                sin.atan2(cos)
+            })
+            .collect();
+        out.fill(0.0);
+        for ((clip, weight), offsets) in self.clips.iter().zip(&weights).zip(&self.offsets) {
+            for (joint, out) in out.iter_mut().enumerate() {
+                let shift = match (self.limb_of[joint], offsets) {
+                    (Some(limb), Some(offsets)) => timeline[limb] - offsets[limb],
+                    _ => 0.0,
+                };
+                *out += weight * clip.sample(t + shift / TAU, joint);
+            }
+        }
+        if let (Some(path), Some(amount)) = (&self.added, parameters.get(self.free.len())) {
+            for (joint, out) in out.iter_mut().enumerate() {
+                *out += amount * (path.sample(1.0, joint) - path.sample(0.0, joint));
+            }
+        }
+    }
+}
+
+impl Synthesis for ClipBlend {
+    fn width(&self) -> usize {
+        self.levers.len()
+    }
+
+    fn duration_s(&self, parameters: &[f64]) -> f64 {
+        match self.kind {
+            ClipKind::Cycle => 1.0 / self.wish(parameters)[1].max(1e-3),
+            ClipKind::Path => PATH_S,
+        }
+    }
+
+    fn features(&self, parameters: &[f64], t: f64, out: &mut [f64]) {
+        self.pose(parameters, t, out);
+        for (out, lever) in out.iter_mut().zip(&self.levers) {
+            *out *= lever;
+        }
+    }
+
+    fn root(&self, parameters: &[f64], t: f64) -> Option<[f64; 3]> {
+        let (mut forward, mut left, mut yaw) = (0.0, 0.0, 0.0);
+        for (clip, weight) in self.clips.iter().zip(self.clip_weights(parameters)) {
+            forward += weight * clip.root.forward_m;
+            left += weight * clip.root.left_m;
+            yaw += weight * clip.root.yaw_rad;
+        }
+        // At constant speed along an arc.
+        let turned = yaw * t;
+        let (ahead, aside) = if turned.abs() > 1e-9 {
+            (turned.sin() / turned, (1.0 - turned.cos()) / turned)
+        } else {
+            (1.0, 0.5 * turned)
+        };
+        let (x, y) = (forward * t, left * t);
+        Some([x * ahead - y * aside, x * aside + y * ahead, turned])
+    }
+
+    fn name(&self, parameters: &[f64]) -> String {
+        let weights = self.clip_weights(parameters);
+        let added = parameters.get(self.free.len()).copied().unwrap_or(0.0);
+        let pure = weights.iter().position(|w| *w > 1.0 - 1e-6);
+        let base = match pure {
+            Some(clip) => self.clips[clip].name.clone(),
+            None => {
+                let [amplitude, frequency_hz] = self.wish(parameters);
+                format!("{amplitude:.2} at {frequency_hz:.2} Hz")
+            }
+        };
+        match &self.added {
+            Some(path) if added > 0.0 => format!("{base} + {added:.2} {}", path.name),
+            _ => base,
+        }
+    }
+}
