@@ -4,6 +4,7 @@ pub mod bus;
 pub mod clip;
 mod failure;
 pub mod gesture;
+pub mod graph;
 pub mod map;
 pub mod poses;
 pub mod run;
@@ -39,6 +40,8 @@ enum Command {
     Poses(poses::PosesArgs),
     /// Bring motion in; author gaits for a legged robot
     Clip(clip::ClipArgs),
+    /// The motion graph: show it, check it, compare ways to find transitions
+    Graph(graph::GraphArgs),
     /// Pose mapping: the performer's pose itself drives a body; suggest, learn, apply, study
     Map(map::MapArgs),
     /// Look at and set up servos on a bus
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Some(Command::Gesture(args)) => gesture::run(args),
         Some(Command::Poses(args)) => poses::run(args),
         Some(Command::Clip(args)) => clip::run(&args),
+        Some(Command::Graph(args)) => graph::run(&args),
         Some(Command::Map(args)) => map::run(args),
         Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),

@@ -67,14 +67,17 @@ pub fn lever_arms(model: &RobotModel) -> Vec<f64> {
 /// A class of clips as the animator blends it: common phase, every limb with its own timeline.
 ///
 /// Parameters are, in this order and as far as the clips have more than one value: amplitude,
-/// frequency, and the amount of an added path (crouch). Clips at amplitude 0 are left out: between rest and
-/// the smallest moving clip motion only grows.
+/// frequency, and the amount of an added path (crouch). From rest (the clip at amplitude 0) to the smallest
+/// moving clip the motion grows in proportion to amplitude, as in the animator.
 #[derive(Clone, Debug)]
 pub struct ClipBlend {
     name: String,
     kind: ClipKind,
+    /// The moving clips; then the rest clip, if there is one.
     clips: Vec<Clip>,
     weights: Weights,
+    /// Least amplitude of a moving clip; 0 without a rest clip.
+    least_amplitude: f64,
     low: Parameters,
     high: Parameters,
     free: Vec<usize>,
@@ -99,7 +102,9 @@ impl ClipBlend {
             class: name.into(),
             source,
         })?;
-        let clips: Vec<&Clip> = moving.iter().map(|e| &e.clip).collect();
+        let rest = examples.iter().find(|e| e.parameters[0] == 0.0);
+        let blended = moving.iter().copied().chain(rest);
+        let clips: Vec<&Clip> = blended.map(|e| &e.clip).collect();
         let (limb_of, offsets) = timelines(name, &clips, first.clip.joints())?;
         let (mut low, mut high) = (parameters[0], parameters[0]);
         for p in &parameters {
@@ -107,6 +112,10 @@ impl ClipBlend {
                 low[d] = low[d].min(p[d]);
                 high[d] = high[d].max(p[d]);
             }
+        }
+        let least_amplitude = if rest.is_some() { low[0] } else { 0.0 };
+        if rest.is_some() {
+            low[0] = 0.0;
         }
         if kind == ClipKind::Path {
             // Progression is time here, and paths have no frequency.
@@ -117,6 +126,7 @@ impl ClipBlend {
             kind,
             clips: clips.into_iter().cloned().collect(),
             weights,
+            least_amplitude,
             free: (0..2).filter(|d| high[*d] > low[*d]).collect(),
             low,
             high,
@@ -132,6 +142,16 @@ impl ClipBlend {
     pub fn at_full_amplitude(mut self) -> Self {
         self.low[0] = self.high[0];
         self.free.retain(|d| *d != 0);
+        self
+    }
+
+    /// The same without rest: amplitude begins at the smallest moving clip.
+    #[must_use]
+    pub fn moving(mut self) -> Self {
+        if self.free.contains(&0) {
+            self.low[0] = self.low[0].max(self.least_amplitude);
+            self.free.retain(|d| self.high[*d] > self.low[*d]);
+        }
         self
     }
 
@@ -206,7 +226,15 @@ impl ClipBlend {
     /// Weights of the clips.
     fn clip_weights(&self, parameters: &[f64]) -> Vec<f64> {
         let mut weights = vec![0.0; self.clips.len()];
-        self.weights.at(self.wish(parameters), &mut weights);
+        let wish = self.wish(parameters);
+        let moving = self.weights.len();
+        self.weights.at(wish, &mut weights[..moving]);
+        if let Some(rest) = weights.get(moving) {
+            debug_assert_eq!(*rest, 0.0, "nothing weighs the rest clip yet");
+            let share = (wish[0] / self.least_amplitude.max(1e-9)).clamp(0.0, 1.0);
+            weights.iter_mut().for_each(|w| *w *= share);
+            weights[moving] = 1.0 - share;
+        }
         weights
     }
 
