@@ -69,3 +69,20 @@ pub(super) fn row_times(w: &[f64], matrix: &[f64], out: &mut [f64]) {
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
+
+/// `M v`, a matrix of `v.len()` columns times a column.
+pub(super) fn times_column(matrix: &[f64], v: &[f64], out: &mut [f64]) {
+    for (out, row) in out.iter_mut().zip(matrix.chunks_exact(v.len().max(1))) {
+        *out = dot(row, v);
+    }
+}
+
+/// `1/2 w M w`.
+pub(super) fn half_form(w: &[f64], matrix: &[f64]) -> f64 {
+    let rows = matrix.chunks_exact(w.len().max(1));
+    0.5 * w
+        .iter()
+        .zip(rows)
+        .map(|(w_i, row)| w_i * dot(row, w))
+        .sum::<f64>()
+}

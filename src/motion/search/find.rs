@@ -1,10 +1,9 @@
 //! The search itself: the cheapest pair of trellis nodes, exactly, with few pairs visited.
 
-use super::blocks::{across_at, dot, row_times, without_spread};
+use super::bound::{Best, Depths, Slopes};
 use super::class::{FeatureError, SearchClass};
 use super::side::{Side, cells_at_most};
 use super::tables::{DistanceTables, Form};
-use super::tree::Ball;
 use super::{FRAMES_PER_SECOND, MAX_PARAMETERS, State};
 use std::sync::Arc;
 
@@ -162,40 +161,25 @@ pub struct NoTransition {
     pub max_latency_s: Option<f64>,
 }
 
-/// The best pair so far.
-#[derive(Copy, Clone, Debug)]
-struct Best {
-    cost: f64,
-    /// Row and cell of the source, then of the target.
-    at: Option<[usize; 4]>,
-    /// Least distance of a pair that is soon enough, whether similar enough or not.
-    distance: f64,
-}
-
-/// A pair of depths and the least that a pair of its nodes costs.
-#[derive(Copy, Clone, Debug)]
-struct Depths {
-    least: f64,
-    s: u32,
-    d: u32,
-}
-
 /// Searches transitions over one edge. All room is taken at the beginning: a request allocates nothing.
 #[derive(Debug)]
 pub struct Search {
     source: Arc<SearchClass>,
     target: Arc<SearchClass>,
-    tables: Arc<DistanceTables>,
-    options: SearchOptions,
-    is_loop: bool,
-    from: Side,
-    to: Side,
+    pub(super) tables: Arc<DistanceTables>,
+    pub(super) options: SearchOptions,
+    pub(super) is_loop: bool,
+    pub(super) from: Side,
+    pub(super) to: Side,
     /// Rows x rows x references x references.
-    blocks: Vec<f64>,
-    pairs: Vec<Depths>,
-    stack: Vec<(usize, usize)>,
+    pub(super) blocks: Vec<f64>,
+    pub(super) pairs: Vec<Depths>,
+    pub(super) slopes: Slopes,
     /// `w B` of the source node at hand.
-    row: Vec<f64>,
+    pub(super) row: Vec<f64>,
+    /// Cost of a dissimilarity per m^2, and the largest distance that is similar enough.
+    pub(super) distance_weight: f64,
+    pub(super) most_distance: f64,
     source_route: Vec<Waypoint>,
     target_route: Vec<Waypoint>,
 }
@@ -234,8 +218,13 @@ impl Search {
             to: Side::new(&target, rows, &options),
             blocks: vec![0.0; rows * rows_d * cells],
             pairs: Vec::with_capacity(rows * rows_d),
-            stack: Vec::with_capacity(1024),
+            slopes: Slopes::new(
+                [source.references(), target.references()],
+                [&source, &target].map(|class| cells_at_most(class, options.delta_w)),
+            ),
             row: vec![0.0; target.references()],
+            distance_weight: 0.0,
+            most_distance: 0.0,
             source_route: Vec::with_capacity(rows),
             target_route: Vec::with_capacity(rows),
             source,
@@ -301,45 +290,28 @@ impl Search {
 
     /// The cheapest transition from `source` to `target`. Allocates nothing.
     ///
-    /// Costs as much as [`Search::exhaustive`] finds, always: what is left out cannot cost less. States
-    /// outside 0..1 are brought to the edge, not-a-number is taken for 0.
+    /// Costs as much as [`Search::exhaustive`] finds, always: what is left out cannot cost less. For two
+    /// depths the nodes are points x, y of a Euclidean space with costs A, B, and for any e
+    /// `A + B + K |x - y|^2 >= (A + 2 K e.x) + (B - 2 K e.y) - K |e|^2`: a bound in which source and target
+    /// are apart, so its least value takes as many steps as there are nodes, not pairs. Depths whose bound
+    /// is above the best pair so far are left out, and of the others the nodes whose own part is. e is
+    /// improved by conditional gradient steps (Frank and Wolfe), whose corners are tried as pairs.
+    ///
+    /// States outside 0..1 are brought to the edge, not-a-number is taken for 0.
     ///
     /// # Errors
     /// [`NoTransition`] when no pair is similar and soon enough.
     pub fn find(&mut self, source: &State, target: &Target) -> Result<Found, NoTransition> {
         self.grow(source, target);
-        let mut best = Best {
-            cost: f64::INFINITY,
-            at: None,
-            distance: f64::INFINITY,
-        };
-        self.pairs.clear();
-        for s in 0..self.from.rows.len() {
-            for d in 0..self.to.rows.len() {
-                self.prepare(s, d);
-                // The middle of each depth gives a first good pair, and with the radii the least cost.
-                let (a, b) = (self.from.rows[s].root, self.to.rows[d].root);
-                let (a, b) = (self.from.balls[a], self.to.balls[b]);
-                let between = self.distance(s, a.centre, d, b.centre);
-                self.offer(&mut best, [s, a.centre, d, b.centre], between);
-                if let Some(least) = self.least(&best, &a, &b, between) {
-                    self.pairs.push(Depths {
-                        least,
-                        s: s as u32,
-                        d: d as u32,
-                    });
-                }
+        let mut best = Best::none();
+        if self.options.s_min > 0.0 {
+            // First the most similar pair at all: without one that is similar enough there is no cost.
+            self.nearest(&mut best);
+            if best.at.is_none() {
+                return self.conclude(&best);
             }
         }
-        self.pairs
-            .sort_unstable_by(|a, b| a.least.total_cmp(&b.least));
-        for pair in 0..self.pairs.len() {
-            let Depths { least, s, d } = self.pairs[pair];
-            if least >= best.cost {
-                break;
-            }
-            self.descend(s as usize, d as usize, &mut best);
-        }
+        self.cheapest(&mut best);
         self.conclude(&best)
     }
 
@@ -349,40 +321,22 @@ impl Search {
     /// As [`Search::find`].
     pub fn exhaustive(&mut self, source: &State, target: &Target) -> Result<Found, NoTransition> {
         self.grow(source, target);
-        let mut best = Best {
-            cost: f64::INFINITY,
-            at: None,
-            distance: f64::INFINITY,
-        };
-        for s in 0..self.from.rows.len() {
-            for d in 0..self.to.rows.len() {
-                self.prepare(s, d);
-                let (a, b) = (self.from.rows[s].root, self.to.rows[d].root);
-                let (a, b) = (self.from.balls[a], self.to.balls[b]);
-                self.visit(s, d, &a, &b, &mut best);
-            }
-        }
+        let mut best = Best::none();
+        self.all_pairs(&mut best);
         self.conclude(&best)
     }
 
-    /// Cost of a dissimilarity, per m^2.
-    fn distance_weight(&self) -> f64 {
-        if self.tables.d_max() > 0.0 {
-            self.options.kappa / self.tables.d_max()
+    fn grow(&mut self, source: &State, target: &Target) {
+        let d_max = self.tables.d_max();
+        let options = &self.options;
+        self.distance_weight = if d_max > 0.0 {
+            options.kappa / d_max
         } else {
             0.0
-        }
-    }
-
-    /// Largest distance that is similar enough.
-    fn most_distance(&self) -> f64 {
+        };
         // What rounding may add to the distance of equal poses.
-        (1.0 - self.options.s_min) * self.tables.d_max() * (1.0 + 1e-12)
-    }
-
-    fn grow(&mut self, source: &State, target: &Target) {
-        let weight = self.distance_weight();
-        let options = &self.options;
+        self.most_distance = (1.0 - options.s_min) * d_max * (1.0 + 1e-12);
+        let weight = self.distance_weight;
         self.from.grow(&self.source, source, true, options, weight);
         match target {
             Target::State(state) => self.to.grow(&self.target, state, false, options, weight),
@@ -392,126 +346,6 @@ impl Search {
             } => {
                 let class = &self.target;
                 self.to.enter(class, parameters, *between, options, weight);
-            }
-        }
-    }
-
-    fn block_at(&self, s: usize, d: usize) -> std::ops::Range<usize> {
-        let cells = self.from.references * self.to.references;
-        let at = (s * self.to.rows.len() + d) * cells;
-        at..at + cells
-    }
-
-    /// Distances of all references at the times of two depths.
-    fn prepare(&mut self, s: usize, d: usize) {
-        let at = self.block_at(s, d);
-        let block = &mut self.blocks[at];
-        let (row_s, row_d) = (self.from.rows[s].at, self.to.rows[d].at);
-        across_at(&self.tables, row_s, row_d, block);
-        if row_s.part > 0.0 || row_d.part > 0.0 {
-            without_spread(self.from.spread(s), self.to.spread(d), block);
-        }
-    }
-
-    /// Squared distance of two nodes without what the bound adds.
-    fn distance(&mut self, s: usize, cell_s: usize, d: usize, cell_d: usize) -> f64 {
-        let at = self.block_at(s, d);
-        row_times(self.from.weights(cell_s), &self.blocks[at], &mut self.row);
-        self.distance_from_row(s, cell_s, d, cell_d)
-    }
-
-    /// The same when `row` is `w B` of the source node already.
-    fn distance_from_row(&self, s: usize, cell_s: usize, d: usize, cell_d: usize) -> f64 {
-        let own_s = self.from.own[self.from.node(s, cell_s)];
-        let own_d = self.to.own[self.to.node(d, cell_d)];
-        (dot(&self.row, self.to.weights(cell_d)) - own_s - own_d).max(0.0)
-    }
-
-    /// Takes a pair as the best if it is.
-    fn offer(&self, best: &mut Best, at: [usize; 4], distance: f64) {
-        let [s, cell_s, d, cell_d] = at;
-        if self.is_loop && s == 0 && d == 0 {
-            return;
-        }
-        let (a, b) = (self.from.node(s, cell_s), self.to.node(d, cell_d));
-        if let Some(most) = self.options.max_latency_s
-            && self.from.latency_s[a] + self.to.latency_s[b] > most
-        {
-            return;
-        }
-        let whole = distance + self.from.extra[a] + self.to.extra[b];
-        best.distance = best.distance.min(whole);
-        let cost = self.from.cost[a] + self.to.cost[b] + self.distance_weight() * distance;
-        if cost < best.cost && whole <= self.most_distance() {
-            best.cost = cost;
-            best.at = Some(at);
-        }
-    }
-
-    /// The least cost of a pair of nodes in two balls with centres `between` apart (squared); `None`
-    /// when no pair in them can be better than the best, or allowed.
-    fn least(&self, best: &Best, a: &Ball, b: &Ball, between: f64) -> Option<f64> {
-        if let Some(most) = self.options.max_latency_s
-            && a.latency_s + b.latency_s > most
-        {
-            return None;
-        }
-        let gap = (between.sqrt() - a.radius - b.radius).max(0.0);
-        let gap = gap * gap;
-        let least = a.cost + b.cost + self.distance_weight() * gap;
-        // A hair less, so that rounding cannot cut off the best pair.
-        let least = least - 1e-12 * least.abs();
-        let distance = gap + a.extra + b.extra;
-        if distance > self.most_distance() && (best.at.is_some() || distance >= best.distance) {
-            return None;
-        }
-        (least < best.cost).then_some(least)
-    }
-
-    /// All pairs of two balls.
-    fn visit(&mut self, s: usize, d: usize, a: &Ball, b: &Ball, best: &mut Best) {
-        let block = self.block_at(s, d);
-        for levels_s in a.cells.iter() {
-            let cell_s = self.from.cell(&levels_s);
-            row_times(
-                self.from.weights(cell_s),
-                &self.blocks[block.clone()],
-                &mut self.row,
-            );
-            for levels_d in b.cells.iter() {
-                let cell_d = self.to.cell(&levels_d);
-                let distance = self.distance_from_row(s, cell_s, d, cell_d);
-                self.offer(best, [s, cell_s, d, cell_d], distance);
-            }
-        }
-    }
-
-    /// Branch and bound over the balls of two depths.
-    fn descend(&mut self, s: usize, d: usize, best: &mut Best) {
-        self.stack.clear();
-        self.stack
-            .push((self.from.rows[s].root, self.to.rows[d].root));
-        while let Some((at_a, at_b)) = self.stack.pop() {
-            let (a, b) = (self.from.balls[at_a], self.to.balls[at_b]);
-            let between = self.distance(s, a.centre, d, b.centre);
-            self.offer(best, [s, a.centre, d, b.centre], between);
-            if self.least(best, &a, &b, between).is_none() {
-                continue;
-            }
-            // The wider ball is divided; two leaves are visited.
-            let divide_a = a
-                .child
-                .filter(|_| b.child.is_none() || a.radius >= b.radius);
-            match (divide_a, b.child) {
-                (Some(child), _) => {
-                    self.stack.push((child, at_b));
-                    self.stack.push((child + 1, at_b));
-                }
-                (None, Some(child)) => {
-                    self.stack.push((at_a, child));
-                    self.stack.push((at_a, child + 1));
-                }
-                (None, None) => self.visit(s, d, &a, &b, best),
             }
         }
     }
@@ -562,7 +396,7 @@ impl Search {
         let distance = self.distance(s, cell_s, d, cell_d) + self.from.extra[a] + self.to.extra[b];
         let similarity = self.tables.similarity_of(distance);
         let latency = self.options.lambda * FRAMES_PER_SECOND * latency_s;
-        let dissimilar = self.distance_weight() * distance;
+        let dissimilar = self.distance_weight * distance;
         Ok(Found {
             exit: self.from.state(s, cell_s),
             entry: self.to.state(d, cell_d),
@@ -577,7 +411,7 @@ impl Search {
                 penalty: if self.options.mu > 0.0 {
                     self.from.cost[a] + self.to.cost[b]
                         - latency
-                        - self.distance_weight() * (self.from.extra[a] + self.to.extra[b])
+                        - self.distance_weight * (self.from.extra[a] + self.to.extra[b])
                 } else {
                     0.0
                 },

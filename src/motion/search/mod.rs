@@ -18,12 +18,37 @@
 //! [`tables`] has the distances of an edge and the two forms of the similarity of blends, [`find`] is
 //! the search, [`stored`] the baseline with transition points fixed beforehand, [`calibrate`] finds kappa.
 //!
-//! Every blend weight of a node is convex, so a node is a point of a Euclidean space of which only
-//! mutual distances are known. That is enough for an exact search without visiting all pairs: nodes of
-//! equal depth are kept in a tree of balls, and a pair of balls is left out when the least distance
-//! between them and the least latency cost already more than the best pair found.
+//! The search is exact and visits few pairs ([`Search::find`] says how); [`Search::exhaustive`] visits all.
+//!
+//! ```
+//! use handwave::motion::search::*;
+//! use std::sync::Arc;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // Two clips of one feature each, slow and quick, as a class with one parameter.
+//! let wave = |size: f64| -> Vec<f64> { (0..20).map(|k| size * (0.314 * k as f64).sin()).collect() };
+//! let (small, large) = (wave(0.1), wave(0.3));
+//! let clip = |positions, duration_s| ClipFeatures {
+//!     name: "clip", duration_s, width: 1, positions, root: &[], penalty: &[],
+//! };
+//! let clips = [clip(&small, 0.5), clip(&large, 1.0)];
+//! let spec = ClassSpec::new("walk", true, 1);
+//! let walk = Arc::new(SearchClass::new(&spec, &clips, Arc::new(Hat::corners(1)))?);
+//! let spec = ClassSpec::new("bow", false, 1);
+//! let bow = Arc::new(SearchClass::new(&spec, &clips[..1], Arc::new(Hat::corners(0)))?);
+//! let tables = Arc::new(DistanceTables::new(&walk, &bow)?);
+//! // Once per edge; a request then allocates nothing.
+//! let mut search = Search::new(walk, bow, tables, SearchOptions::default())?;
+//! let now = State::new(0.3, &[0.5]);
+//! let found = search.find(&now, &Target::Entry { parameters: [0.0; 4], between: [0.0, 0.5] })?;
+//! println!("leave at {:.2} in {:.2} s, enter at {:.2}", found.exit.t, found.exit_after_s, found.entry.t);
+//! for point in search.source_route() { println!("{:.2} s: {:?}", point.at_s, point.state); }
+//! # Ok(())
+//! # }
+//! ```
 
 mod blocks;
+mod bound;
+mod boxes;
 pub mod calibrate;
 pub mod class;
 pub mod find;
@@ -33,7 +58,6 @@ mod side;
 pub mod stored;
 pub mod study;
 pub mod tables;
-mod tree;
 pub mod weight_map;
 
 pub use calibrate::{Calibration, calibrate};

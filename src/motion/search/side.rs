@@ -5,13 +5,11 @@
 //! a node differ in latency; the least is found by dynamic programming over depths (the paper takes any
 //! route, whose length in steps is the same).
 
-use super::blocks::{dot, row_times, within_at};
+use super::blocks::{dot, half_form, row_times, within_at};
+use super::boxes::{LevelBox, Levels};
 use super::class::{Between, SearchClass};
-use super::tree::{Ball, LevelBox, Levels};
 use super::{FRAMES_PER_SECOND, Form, MAX_PARAMETERS, SearchOptions, State};
 
-/// Boxes of at most this many nodes are not divided further.
-const LEAF_CELLS: usize = 4;
 /// Ends of a range are met within this.
 const NEAR: f64 = 1e-9;
 
@@ -20,39 +18,42 @@ const NEAR: f64 = 1e-9;
 pub(super) struct Row {
     pub(super) t: f64,
     pub(super) at: Between,
-    /// Its ball of all nodes.
-    pub(super) root: usize,
-    cells: LevelBox,
+    pub(super) cells: LevelBox,
+    /// The cheapest cell and its cost; infinite when none is soon enough.
+    pub(super) first: usize,
+    pub(super) cost: f64,
 }
 
 /// A trellis with room for the largest request, filled anew by every one.
 #[derive(Debug)]
 pub(super) struct Side {
     pub(super) rows: Vec<Row>,
-    pub(super) balls: Vec<Ball>,
     /// Number of references.
     pub(super) references: usize,
     /// Values of each axis; one value for axes that the class does not have.
     axes: [Vec<f64>; MAX_PARAMETERS],
-    strides: [usize; MAX_PARAMETERS],
+    pub(super) strides: [usize; MAX_PARAMETERS],
     /// Number of cells, product of the axes' lengths.
     stride: usize,
-    /// Cells x references.
+    /// Cells x references, and references x cells.
     weights: Vec<f64>,
+    columns: Vec<f64>,
     /// Cells: length of the blend, s.
     durations_s: Vec<f64>,
-    // Rows x cells: latency (s), predecessor, cost without the pair's distance, 1/2 w D w, distance
-    // added by the bound.
+    // Rows x cells: latency (s), predecessor, cost without the pair's distance, distance added by the
+    // bound, 1/2 w D w (only after `fill_own`).
     pub(super) latency_s: Vec<f64>,
     back: Vec<u32>,
     pub(super) cost: Vec<f64>,
-    pub(super) own: Vec<f64>,
     pub(super) extra: Vec<f64>,
+    pub(super) own: Vec<f64>,
     /// Rows x references.
     spread: Vec<f64>,
-    // Work space: references x references, and references.
+    /// Rows x references x references: squared distances at the row's time.
     within: Vec<f64>,
+    // Work space: references; cells of two stages of the least predecessor.
     row: Vec<f64>,
+    least: [Vec<(f64, u32)>; 2],
 }
 
 /// What a trellis of `class` needs room for.
@@ -72,29 +73,23 @@ impl Side {
         let rows = rows.max(class.frames());
         Self {
             rows: Vec::with_capacity(rows),
-            balls: Vec::with_capacity(2 * nodes),
             references: n,
             axes: std::array::from_fn(|_| Vec::with_capacity(levels)),
             strides: [1; MAX_PARAMETERS],
             stride: 1,
             weights: vec![0.0; cells * n],
+            columns: vec![0.0; cells * n],
             durations_s: vec![0.0; cells],
             latency_s: vec![0.0; nodes],
             back: vec![0; nodes],
             cost: vec![0.0; nodes],
-            own: vec![0.0; nodes],
             extra: vec![0.0; nodes],
+            own: vec![0.0; nodes],
             spread: vec![0.0; rows * n],
-            within: vec![0.0; n * n],
+            within: vec![0.0; rows * n * n],
             row: vec![0.0; n],
+            least: std::array::from_fn(|_| vec![(0.0, 0); cells]),
         }
-    }
-
-    /// Cell of levels.
-    pub(super) fn cell(&self, levels: &Levels) -> usize {
-        (0..MAX_PARAMETERS)
-            .map(|d| usize::from(levels[d]) * self.strides[d])
-            .sum()
     }
 
     /// Index of a node in the tables of rows x cells.
@@ -107,9 +102,25 @@ impl Side {
         &self.weights[cell * self.references..(cell + 1) * self.references]
     }
 
+    /// Weights of one reference, by cell.
+    pub(super) fn column(&self, reference: usize) -> &[f64] {
+        &self.columns[reference * self.stride..(reference + 1) * self.stride]
+    }
+
     /// Spread of every reference at a row's time, see [`within_at`].
     pub(super) fn spread(&self, row: usize) -> &[f64] {
         &self.spread[row * self.references..(row + 1) * self.references]
+    }
+
+    /// Squared distances of the references at a row's time.
+    pub(super) fn within(&self, row: usize) -> &[f64] {
+        let cells = self.references * self.references;
+        &self.within[row * cells..(row + 1) * cells]
+    }
+
+    /// `1/2 w D w` of a node.
+    pub(super) fn own(&self, row: usize, cell: usize) -> f64 {
+        half_form(self.weights(cell), self.within(row))
     }
 
     /// The state of a node.
@@ -141,14 +152,12 @@ impl Side {
         let origin = self.set_axes(class, &state.parameters, Some(options.delta_w));
         self.rows.clear();
         let mut t = start_of(class, state.t);
-        let mut cells = LevelBox {
-            low: origin,
-            high: origin,
-        };
+        let mut cells = LevelBox::at(origin);
         self.push_row(class, t, cells);
-        let first = self.cell(&origin);
-        self.latency_s[first] = 0.0;
-        self.back[first] = first as u32;
+        for (line, _) in cells.lines(self.strides) {
+            self.latency_s[line.start] = 0.0;
+            self.back[line.start] = line.start as u32;
+        }
         for depth in 1..=options.l_max {
             let Some((after, step)) = advance(class, t, options.delta_t, forwards) else {
                 break;
@@ -160,7 +169,7 @@ impl Side {
                 cells.high[d] = (cells.high[d] + 1).min(self.axes[d].len() as u16 - 1);
             }
             self.push_row(class, t, cells);
-            self.relax(depth, &before, &cells, step);
+            self.relax(class.parameters(), depth, before, step);
         }
         self.finish(class, options, distance_weight);
     }
@@ -174,12 +183,8 @@ impl Side {
         options: &SearchOptions,
         distance_weight: f64,
     ) {
-        let origin = self.set_axes(class, parameters, None);
+        let cells = LevelBox::at(self.set_axes(class, parameters, None));
         self.rows.clear();
-        let cells = LevelBox {
-            low: origin,
-            high: origin,
-        };
         for frame in 0..class.frames() {
             let t = class.time_of(frame);
             if (range[0] - NEAR..=range[1] + NEAR).contains(&t) {
@@ -212,16 +217,26 @@ impl Side {
             let p = parameters[d].max(0.0).min(1.0);
             match step {
                 Some(step) if d < class.parameters() => {
+                    // A remainder within rounding belongs to the end.
                     let down = ((p - NEAR) / step).ceil().max(0.0) as u16;
                     let up = ((1.0 - p - NEAR) / step).ceil().max(0.0) as u16;
-                    let below = (1..=down).rev().map(|k| (p - f64::from(k) * step).max(0.0));
-                    axis.extend(below);
+                    let below = |k: u16| {
+                        if k == down {
+                            0.0
+                        } else {
+                            p - f64::from(k) * step
+                        }
+                    };
+                    let above = |k: u16| {
+                        if k == up {
+                            1.0
+                        } else {
+                            p + f64::from(k) * step
+                        }
+                    };
+                    axis.extend((1..=down).rev().map(below));
                     axis.push(p);
-                    axis.extend((1..=up).map(|k| (p + f64::from(k) * step).min(1.0)));
-                    // A remainder within rounding belongs to the end.
-                    if down > 0 && axis[0] < NEAR {
-                        axis[0] = 0.0;
-                    }
+                    axis.extend((1..=up).map(above));
                     origin[d] = down;
                 }
                 _ => axis.push(p),
@@ -229,14 +244,21 @@ impl Side {
             self.strides[d] = self.stride;
             self.stride *= axis.len();
         }
+        let n = self.references;
         let mut state = State::default();
         for cell in 0..self.stride {
-            for d in 0..MAX_PARAMETERS {
-                state.parameters[d] = self.axes[d][cell / self.strides[d] % self.axes[d].len()];
+            let mut rest = cell;
+            for d in 0..class.parameters() {
+                let axis = &self.axes[d];
+                state.parameters[d] = axis[rest % axis.len()];
+                rest /= axis.len();
             }
-            let at = cell * self.references..(cell + 1) * self.references;
-            class.weights(&state, &mut self.weights[at.clone()]);
-            self.durations_s[cell] = class.duration_s(&self.weights[at]);
+            let weights = &mut self.weights[cell * n..(cell + 1) * n];
+            class.weights(&state, weights);
+            self.durations_s[cell] = class.duration_s(weights);
+            for (j, w) in weights.iter().enumerate() {
+                self.columns[j * self.stride + cell] = *w;
+            }
         }
         origin
     }
@@ -245,125 +267,166 @@ impl Side {
         self.rows.push(Row {
             t,
             at: class.between(t),
-            root: 0,
             cells,
+            first: 0,
+            cost: f64::INFINITY,
         });
     }
 
     /// Least latency of every node of a depth from those of the depth before. A step is played at the
-    /// mean duration of its two ends, since `w` and with it `T(w)` is linear within the step.
-    fn relax(&mut self, depth: usize, before: &LevelBox, cells: &LevelBox, step: f64) {
-        for levels in cells.iter() {
-            let cell = self.cell(&levels);
-            // Staying comes first, so that it wins among equals.
-            let stays = before.holds(&levels).then_some(levels);
-            let mut around = *before;
-            for d in 0..MAX_PARAMETERS {
-                around.low[d] = around.low[d].max(levels[d].saturating_sub(1));
-                around.high[d] = around.high[d].min(levels[d] + 1);
+    /// mean duration of its two ends, since `w` and with it `T(w)` is linear within the step. The least
+    /// predecessor in a box around a cell is had axis by axis.
+    fn relax(&mut self, parameters: usize, depth: usize, before: LevelBox, step: f64) {
+        let (above, here) = ((depth - 1) * self.stride, depth * self.stride);
+        let [now, next] = &mut self.least;
+        for (line, _) in before.lines(self.strides) {
+            for cell in line {
+                let latency = self.latency_s[above + cell];
+                now[cell] = (latency + 0.5 * step * self.durations_s[cell], cell as u32);
             }
-            let mut best = (f64::INFINITY, 0);
-            for from in stays.into_iter().chain(around.iter()) {
-                let from = self.cell(&from);
-                let mean_s = 0.5 * (self.durations_s[from] + self.durations_s[cell]);
-                let latency = self.latency_s[self.node(depth - 1, from)] + step * mean_s;
-                if latency < best.0 {
-                    best = (latency, from);
+        }
+        let mut reached = before;
+        for d in 0..parameters {
+            let (low, high) = (reached.low[d], reached.high[d]);
+            reached.low[d] = low.saturating_sub(1);
+            reached.high[d] = (high + 1).min(self.axes[d].len() as u16 - 1);
+            let stride = self.strides[d];
+            for (line, levels) in reached.lines(self.strides) {
+                for (along, cell) in line.enumerate() {
+                    let level = levels[d] + if d == 0 { along as u16 } else { 0 };
+                    // Staying comes first, so that it wins among equals.
+                    let mut best = (f64::INFINITY, 0);
+                    if (low..=high).contains(&level) {
+                        best = now[cell];
+                    }
+                    if level > low && now[cell - stride].0 < best.0 {
+                        best = now[cell - stride];
+                    }
+                    if level < high && now[cell + stride].0 < best.0 {
+                        best = now[cell + stride];
+                    }
+                    next[cell] = best;
                 }
             }
-            let node = self.node(depth, cell);
-            self.latency_s[node] = best.0;
-            self.back[node] = best.1 as u32;
+            std::mem::swap(now, next);
+        }
+        for (line, _) in reached.lines(self.strides) {
+            for cell in line {
+                let (latency, from) = now[cell];
+                self.latency_s[here + cell] = latency + 0.5 * step * self.durations_s[cell];
+                self.back[here + cell] = from;
+            }
         }
     }
 
-    /// Costs, distances and balls of all rows.
+    /// Costs of all nodes and distances of the references at all times.
     fn finish(&mut self, class: &SearchClass, options: &SearchOptions, distance_weight: f64) {
-        self.balls.clear();
         let n = self.references;
+        let per_second = options.lambda * FRAMES_PER_SECOND;
+        let most_s = options.max_latency_s.unwrap_or(f64::INFINITY);
         for row in 0..self.rows.len() {
             let Row { at, cells, .. } = self.rows[row];
             let spread = &mut self.spread[row * n..(row + 1) * n];
-            within_at(class, at, spread, &mut self.within);
-            let scale = self.within.iter().copied().fold(0.0, f64::max);
-            let penalties = (options.mu > 0.0).then(|| {
-                let (here, there) = (class.penalty(at.frame), class.penalty(at.next));
-                (here, there)
-            });
-            for levels in cells.iter() {
-                let cell = self.cell(&levels);
-                let node = self.node(row, cell);
-                let w = &self.weights[cell * n..(cell + 1) * n];
-                row_times(w, &self.within, &mut self.row);
-                let own = 0.5 * dot(&self.row, w);
-                let spread = &self.spread[row * n..(row + 1) * n];
-                let extra = match options.form {
-                    Form::Exact => 0.0,
-                    Form::Bound => own + dot(spread, w),
-                };
-                let penalty = penalties.map_or(0.0, |(here, there)| {
-                    (1.0 - at.part) * dot(here, w) + at.part * dot(there, w)
-                });
-                self.own[node] = own;
-                self.extra[node] = extra;
-                self.cost[node] = options.lambda * FRAMES_PER_SECOND * self.latency_s[node]
-                    + distance_weight * extra
-                    + options.mu * penalty;
-            }
-            self.rows[row].root = self.balls.len();
-            self.plant(row, cells, scale);
-        }
-    }
-
-    /// The tree of balls of one row.
-    fn plant(&mut self, row: usize, cells: LevelBox, scale: f64) {
-        let first = self.balls.len();
-        let ball = self.ball(row, cells, scale);
-        self.balls.push(ball);
-        let mut next = first;
-        while next < self.balls.len() {
-            let cells = self.balls[next].cells;
-            if cells.cells() > LEAF_CELLS
-                && let Some((below, above)) = cells.halves()
-            {
-                self.balls[next].child = Some(self.balls.len());
-                for half in [below, above] {
-                    let ball = self.ball(row, half, scale);
-                    self.balls.push(ball);
+            let within = &mut self.within[row * n * n..(row + 1) * n * n];
+            within_at(class, at, spread, within);
+            let mut best = (f64::INFINITY, 0);
+            for (line, _) in cells.lines(self.strides) {
+                for cell in line {
+                    let node = row * self.stride + cell;
+                    let w = &self.weights[cell * n..(cell + 1) * n];
+                    let latency = self.latency_s[node];
+                    let mut cost = per_second * latency;
+                    self.extra[node] = 0.0;
+                    if options.form == Form::Bound {
+                        row_times(w, within, &mut self.row);
+                        let extra = 0.5 * dot(&self.row, w) + dot(spread, w);
+                        self.extra[node] = extra;
+                        cost += distance_weight * extra;
+                    }
+                    if options.mu > 0.0 {
+                        let (here, there) = (class.penalty(at.frame), class.penalty(at.next));
+                        let penalty = (1.0 - at.part) * dot(here, w) + at.part * dot(there, w);
+                        cost += options.mu * penalty;
+                    }
+                    if latency > most_s {
+                        cost = f64::INFINITY;
+                    }
+                    self.cost[node] = cost;
+                    if cost < best.0 {
+                        best = (cost, cell);
+                    }
                 }
             }
-            next += 1;
+            (self.rows[row].cost, self.rows[row].first) = best;
         }
     }
 
-    fn ball(&mut self, row: usize, cells: LevelBox, scale: f64) -> Ball {
-        let n = self.references;
-        let centre = self.cell(&cells.middle());
-        let w = &self.weights[centre * n..(centre + 1) * n];
-        row_times(w, &self.within, &mut self.row);
-        let own = self.own[self.node(row, centre)];
-        let mut ball = Ball {
-            cells,
-            centre,
-            radius: 0.0,
-            cost: f64::INFINITY,
-            latency_s: f64::INFINITY,
-            extra: f64::INFINITY,
-            child: None,
-        };
-        let mut farthest: f64 = 0.0;
-        for levels in cells.iter() {
-            let cell = self.cell(&levels);
-            let node = self.node(row, cell);
-            let distance = dot(&self.row, self.weights(cell)) - own - self.own[node];
-            farthest = farthest.max(distance);
-            ball.cost = ball.cost.min(self.cost[node]);
-            ball.latency_s = ball.latency_s.min(self.latency_s[node]);
-            ball.extra = ball.extra.min(self.extra[node]);
+    /// Fills [`Side::own`] for all nodes.
+    pub(super) fn fill_own(&mut self) {
+        for row in 0..self.rows.len() {
+            for (line, _) in self.rows[row].cells.lines(self.strides) {
+                for cell in line {
+                    let node = self.node(row, cell);
+                    self.own[node] = self.own(row, cell);
+                }
+            }
         }
-        // A little larger than it is: what cancels in the difference must not make it too small.
-        ball.radius = (farthest + 1e-14 * scale).sqrt();
-        ball
+    }
+
+    /// Puts in place of every node's cost what `other(cost, extra)` says, keeping the costs aside.
+    pub(super) fn swap_costs(&mut self, other: &dyn Fn(f64, f64) -> f64) {
+        for row in 0..self.rows.len() {
+            let mut best = (f64::INFINITY, 0);
+            for (line, _) in self.rows[row].cells.lines(self.strides) {
+                for cell in line {
+                    let node = row * self.stride + cell;
+                    self.own[node] = self.cost[node];
+                    self.cost[node] = other(self.cost[node], self.extra[node]);
+                    if self.cost[node] < best.0 {
+                        best = (self.cost[node], cell);
+                    }
+                }
+            }
+            (self.rows[row].cost, self.rows[row].first) = best;
+        }
+    }
+
+    /// Undoes [`Side::swap_costs`].
+    pub(super) fn restore_costs(&mut self) {
+        for row in 0..self.rows.len() {
+            let mut best = (f64::INFINITY, 0);
+            for (line, _) in self.rows[row].cells.lines(self.strides) {
+                for cell in line {
+                    let node = row * self.stride + cell;
+                    self.cost[node] = self.own[node];
+                    if self.cost[node] < best.0 {
+                        best = (self.cost[node], cell);
+                    }
+                }
+            }
+            (self.rows[row].cost, self.rows[row].first) = best;
+        }
+    }
+
+    /// `cost + gradient . w` of all nodes of a row into `out` (by cell); the least and its cell.
+    pub(super) fn tangent(&self, row: usize, gradient: &[f64], out: &mut [f64]) -> (f64, usize) {
+        let mut best = (f64::INFINITY, self.rows[row].first);
+        for (line, _) in self.rows[row].cells.lines(self.strides) {
+            let out = &mut out[line.clone()];
+            let node = row * self.stride;
+            out.copy_from_slice(&self.cost[node + line.start..node + line.end]);
+            for (j, g) in gradient.iter().enumerate() {
+                for (out, w) in out.iter_mut().zip(&self.column(j)[line.clone()]) {
+                    *out += g * w;
+                }
+            }
+            for (along, value) in out.iter().enumerate() {
+                if *value < best.0 {
+                    best = (*value, line.start + along);
+                }
+            }
+        }
+        best
     }
 }
 
