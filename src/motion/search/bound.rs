@@ -1,10 +1,14 @@
 //! Which pair is the cheapest, without visiting all: a separable lower bound (see [`Search::find`]).
 
-use super::blocks::{across_at, dot, half_form, row_times, times_column, without_spread};
+use super::blocks::{across_at, dot, row_times, times_column, without_spread};
+use super::boxes::LevelBox;
 use super::find::Search;
+use super::side::Side;
 
 /// Steps towards a better bound for two depths, at most.
-const STEPS: usize = 12;
+const STEPS: usize = 3;
+/// So many pairs are visited rather than bounded again.
+const FEW_PAIRS: usize = 128;
 
 /// The best pair so far.
 #[derive(Copy, Clone, Debug)]
@@ -50,9 +54,10 @@ pub(super) struct Slopes {
     /// By cell: a node's own part of the bound.
     parts_s: Vec<f64>,
     parts_d: Vec<f64>,
-    /// Nodes that are left: own part, cell, 1/2 w D w.
-    left_s: Vec<(f64, usize, f64)>,
-    left_d: Vec<(f64, usize, f64)>,
+    /// Nodes that are left: own part, cell; and `1/2 v D v` of the target's.
+    left_s: Vec<(f64, usize)>,
+    left_d: Vec<(f64, usize)>,
+    own: Vec<f64>,
 }
 
 impl Slopes {
@@ -71,6 +76,7 @@ impl Slopes {
             parts_d: vec![0.0; cells_d],
             left_s: Vec::with_capacity(cells_s),
             left_d: Vec::with_capacity(cells_d),
+            own: Vec::with_capacity(cells_d),
         }
     }
 }
@@ -83,8 +89,8 @@ struct Bound {
     /// Where the parts are least: cells, and the parts.
     cells: [usize; 2],
     parts: [f64; 2],
-    /// Weight of distances times `|e|^2`.
-    offset: f64,
+    /// Squared distance of the two cells.
+    distance: f64,
     /// `|e|^2`.
     length: f64,
 }
@@ -176,8 +182,11 @@ impl Search {
                 continue;
             }
             self.prepare(s, d);
-            self.begin(s, d);
-            let bound = self.bound(s, d, best);
+            let boxes = [self.from.rows[s].cells, self.to.rows[d].cells];
+            if self.begin(s, d, &boxes).is_none() {
+                continue;
+            }
+            let bound = self.bound(s, d, &boxes, best);
             let least = bound.least - slack;
             if least < best.cost {
                 self.pairs.push(Depths {
@@ -198,15 +207,31 @@ impl Search {
         }
     }
 
-    /// Starts with the cheapest node of either side.
-    fn begin(&mut self, s: usize, d: usize) {
-        let (first_s, first_d) = (self.from.rows[s].first, self.to.rows[d].first);
-        self.slopes.w.copy_from_slice(self.from.weights(first_s));
-        self.slopes.v.copy_from_slice(self.to.weights(first_d));
+    /// Starts at the middle of two boxes, or at their cheapest nodes when the middle is too late; the costs
+    /// there. `None` when all nodes of a box are too late.
+    fn begin(&mut self, s: usize, d: usize, boxes: &[LevelBox; 2]) -> Option<f64> {
+        let at = &mut self.slopes;
+        let mut base = 0.0;
+        for (side, row, cells, weights, parts) in [
+            (&self.from, s, &boxes[0], &mut at.w, &mut at.parts_s),
+            (&self.to, d, &boxes[1], &mut at.v, &mut at.parts_d),
+        ] {
+            let mut cell = cells.middle(side.strides);
+            let mut cost = side.cost[side.node(row, cell)];
+            if !cost.is_finite() {
+                (cost, cell) = side.tangent(row, cells, &[], parts);
+                if !cost.is_finite() {
+                    return None;
+                }
+            }
+            weights.copy_from_slice(side.weights(cell));
+            base += cost;
+        }
+        Some(base)
     }
 
-    /// The bound at e of the two blends; its corner is offered as a pair.
-    fn bound(&mut self, s: usize, d: usize, best: &mut Best) -> Bound {
+    /// The bound of the nodes in two boxes at e of the two blends; its corner is offered as a pair.
+    fn bound(&mut self, s: usize, d: usize, boxes: &[LevelBox; 2], best: &mut Best) -> Bound {
         let block = self.block_at(s, d);
         let block = &self.blocks[block];
         let k = self.distance_weight;
@@ -224,90 +249,147 @@ impl Search {
         for ((slope, b), d) in at.slope_d.iter_mut().zip(&at.w_b).zip(&at.d_v) {
             *slope = k * (b - d);
         }
-        let (part_s, cell_s) = self.from.tangent(s, &at.slope_s, &mut at.parts_s);
-        let (part_d, cell_d) = self.to.tangent(d, &at.slope_d, &mut at.parts_d);
+        let (part_s, cell_s) = self
+            .from
+            .tangent(s, &boxes[0], &at.slope_s, &mut at.parts_s);
+        let (part_d, cell_d) = self.to.tangent(d, &boxes[1], &at.slope_d, &mut at.parts_d);
         let distance = self.distance(s, cell_s, d, cell_d);
         self.offer(best, [s, cell_s, d, cell_d], distance);
         Bound {
             least: part_s + part_d - k * length,
             cells: [cell_s, cell_d],
             parts: [part_s, part_d],
-            offset: k * length,
+            distance,
             length,
         }
     }
 
-    /// Finds the best pair of two depths, if it is better than the best so far.
-    fn settle(&mut self, s: usize, d: usize, slack: f64, best: &mut Best) {
-        self.begin(s, d);
+    /// One conditional gradient step on `base + k |e|^2`: towards the corner of the bound. Returns the
+    /// new base; `None` when there is little to gain.
+    fn improve(&mut self, s: usize, d: usize, base: f64, bound: &Bound) -> Option<f64> {
         let k = self.distance_weight;
-        let mut base = self.from.rows[s].cost + self.to.rows[d].cost;
-        let mut bound = self.bound(s, d, best);
-        for _ in 0..STEPS {
-            if bound.least - slack >= best.cost {
-                return;
-            }
-            // Line search towards the corner on base + k |e|^2.
-            let [cell_s, cell_d] = bound.cells;
-            let corner =
-                self.from.cost[self.from.node(s, cell_s)] + self.to.cost[self.to.node(d, cell_d)];
-            let falls = base + 2.0 * bound.offset - bound.parts[0] - bound.parts[1];
-            if !(falls > 1e-3 * best.cost.min(1e12)) || k == 0.0 {
-                break;
-            }
-            let along = (bound.parts[0] + bound.parts[1] - corner) / k - 2.0 * bound.length;
-            let apart = self.distance(s, cell_s, d, cell_d) - bound.length - along;
-            let step = if apart > 0.0 {
-                (0.5 * falls / (k * apart)).clamp(0.0, 1.0)
-            } else {
-                1.0
-            };
-            base += step * (corner - base);
-            let at = &mut self.slopes;
-            for (w, to) in at.w.iter_mut().zip(self.from.weights(cell_s)) {
-                *w += step * (to - *w);
-            }
-            for (v, to) in at.v.iter_mut().zip(self.to.weights(cell_d)) {
-                *v += step * (to - *v);
-            }
-            bound = self.bound(s, d, best);
+        let [cell_s, cell_d] = bound.cells;
+        let corner =
+            self.from.cost[self.from.node(s, cell_s)] + self.to.cost[self.to.node(d, cell_d)];
+        let parts = bound.parts[0] + bound.parts[1];
+        let falls = base + 2.0 * k * bound.length - parts;
+        if !(falls > 1e-3 * (base + k * bound.length)) {
+            return None;
         }
-        if bound.least - slack < best.cost {
-            self.visit_left(s, d, &bound, slack, best);
+        let along = (parts - corner) / k - 2.0 * bound.length;
+        let apart = bound.distance - bound.length - along;
+        let step = if apart > 0.0 {
+            (0.5 * falls / (k * apart)).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        let at = &mut self.slopes;
+        for (w, to) in at.w.iter_mut().zip(self.from.weights(cell_s)) {
+            *w += step * (to - *w);
+        }
+        for (v, to) in at.v.iter_mut().zip(self.to.weights(cell_d)) {
+            *v += step * (to - *v);
+        }
+        Some(base + step * (corner - base))
+    }
+
+    /// Finds the best pair of two depths, if it is better than the best so far: boxes of nodes are
+    /// shrunk to what the bound leaves and divided, until few pairs are left to visit.
+    fn settle(&mut self, s: usize, d: usize, slack: f64, best: &mut Best) {
+        self.stack.clear();
+        self.stack
+            .push([self.from.rows[s].cells, self.to.rows[d].cells]);
+        while let Some(boxes) = self.stack.pop() {
+            let Some(mut base) = self.begin(s, d, &boxes) else {
+                continue;
+            };
+            let mut bound = self.bound(s, d, &boxes, best);
+            for _ in 0..STEPS {
+                if bound.least - slack >= best.cost || self.distance_weight == 0.0 {
+                    break;
+                }
+                let Some(better) = self.improve(s, d, base, &bound) else {
+                    break;
+                };
+                base = better;
+                bound = self.bound(s, d, &boxes, best);
+            }
+            if bound.least - slack >= best.cost {
+                continue;
+            }
+            let left = self.leave(&boxes, &bound, slack, best);
+            let pairs = self.slopes.left_s.len() * self.slopes.left_d.len();
+            if pairs == 0 {
+                continue;
+            }
+            let wider = usize::from(left[1].extent() > left[0].extent());
+            match left[wider].halves() {
+                Some(halves) if pairs > FEW_PAIRS => {
+                    for half in halves {
+                        let mut boxes = left;
+                        boxes[wider] = half;
+                        self.stack.push(boxes);
+                    }
+                }
+                _ => self.visit_left(s, d, &bound, slack, best),
+            }
         }
     }
 
-    /// Visits the pairs of those nodes whose own part of the bound leaves them a chance.
-    fn visit_left(&mut self, s: usize, d: usize, bound: &Bound, slack: f64, best: &mut Best) {
-        let limit = best.cost + bound.offset + slack;
+    /// Collects the nodes whose own part of the bound leaves them a chance; the boxes around them.
+    fn leave(
+        &mut self,
+        boxes: &[LevelBox; 2],
+        bound: &Bound,
+        slack: f64,
+        best: &Best,
+    ) -> [LevelBox; 2] {
+        let limit = best.cost + self.distance_weight * bound.length + slack;
         let at = &mut self.slopes;
-        for (left, parts, side, row, other) in [
-            (&mut at.left_s, &at.parts_s, &self.from, s, bound.parts[1]),
-            (&mut at.left_d, &at.parts_d, &self.to, d, bound.parts[0]),
-        ] {
-            left.clear();
-            for (line, _) in side.rows[row].cells.lines(side.strides) {
-                for cell in line {
-                    if parts[cell] + other < limit {
-                        let own = half_form(side.weights(cell), side.within(row));
-                        left.push((parts[cell], cell, own));
-                    }
-                }
-            }
-            left.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        [
+            collect(
+                &self.from,
+                &boxes[0],
+                &at.parts_s,
+                limit - bound.parts[1],
+                &mut at.left_s,
+            ),
+            collect(
+                &self.to,
+                &boxes[1],
+                &at.parts_d,
+                limit - bound.parts[0],
+                &mut at.left_d,
+            ),
+        ]
+    }
+
+    /// Visits the pairs of the nodes that are left.
+    fn visit_left(&mut self, s: usize, d: usize, bound: &Bound, slack: f64, best: &mut Best) {
+        let at = &mut self.slopes;
+        at.own.clear();
+        at.left_d.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, cell_d) in &at.left_d {
+            at.own.push(self.to.own(d, *cell_d));
         }
+        let offset = self.distance_weight * bound.length + slack;
         let block = self.block_at(s, d);
         for a in 0..self.slopes.left_s.len() {
-            let (part_s, cell_s, own_s) = self.slopes.left_s[a];
+            let (part_s, cell_s) = self.slopes.left_s[a];
+            let least_d = self.slopes.left_d.first().map_or(f64::INFINITY, |l| l.0);
+            if part_s + least_d - offset >= best.cost {
+                continue;
+            }
+            let own_s = self.from.own(s, cell_s);
             let weights = self.from.weights(cell_s);
             row_times(weights, &self.blocks[block.clone()], &mut self.row);
             for b in 0..self.slopes.left_d.len() {
-                let (part_d, cell_d, own_d) = self.slopes.left_d[b];
-                if part_s + part_d - bound.offset - slack >= best.cost {
+                let (part_d, cell_d) = self.slopes.left_d[b];
+                if part_s + part_d - offset >= best.cost {
                     break;
                 }
                 let product = dot(&self.row, self.to.weights(cell_d));
-                let distance = (product - own_s - own_d).max(0.0);
+                let distance = (product - own_s - self.slopes.own[b]).max(0.0);
                 self.offer(best, [s, cell_s, d, cell_d], distance);
             }
         }
@@ -337,4 +419,27 @@ impl Search {
             self.offer(best, [s, cell_s, d, cell_d], distance);
         }
     }
+}
+
+/// Nodes of a box whose part is below a limit, into `left`; the box around them.
+fn collect(
+    side: &Side,
+    cells: &LevelBox,
+    parts: &[f64],
+    limit: f64,
+    left: &mut Vec<(f64, usize)>,
+) -> LevelBox {
+    left.clear();
+    let mut around: Option<LevelBox> = None;
+    for (line, levels) in cells.lines(side.strides) {
+        for (along, cell) in line.enumerate() {
+            if parts[cell] < limit {
+                left.push((parts[cell], cell));
+                let mut here = levels;
+                here[0] += along as u16;
+                around = Some(around.map_or(LevelBox::at(here), |a| a.with(here)));
+            }
+        }
+    }
+    around.unwrap_or(*cells)
 }

@@ -22,6 +22,43 @@ impl LevelBox {
         }
     }
 
+    /// The smallest box around this one and a cell.
+    pub(super) fn with(mut self, levels: Levels) -> Self {
+        for d in 0..MAX_PARAMETERS {
+            self.low[d] = self.low[d].min(levels[d]);
+            self.high[d] = self.high[d].max(levels[d]);
+        }
+        self
+    }
+
+    /// Levels along the longest axis.
+    pub(super) fn extent(&self) -> u16 {
+        (0..MAX_PARAMETERS)
+            .map(|d| self.high[d] - self.low[d])
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Two halves along the longest axis; `None` for a single cell.
+    pub(super) fn halves(&self) -> Option<[Self; 2]> {
+        let longest = (0..MAX_PARAMETERS).max_by_key(|d| self.high[*d] - self.low[*d])?;
+        let extent = self.high[longest] - self.low[longest];
+        if extent == 0 {
+            return None;
+        }
+        let (mut below, mut above) = (*self, *self);
+        below.high[longest] = self.low[longest] + extent / 2;
+        above.low[longest] = below.high[longest] + 1;
+        Some([below, above])
+    }
+
+    /// The cell in the middle.
+    pub(super) fn middle(&self, strides: [usize; MAX_PARAMETERS]) -> usize {
+        (0..MAX_PARAMETERS)
+            .map(|d| usize::from(self.low[d] + (self.high[d] - self.low[d]) / 2) * strides[d])
+            .sum()
+    }
+
     /// All lines of the box along the first axis, whose stride is 1: their cells and the levels of their
     /// first cell.
     pub(super) fn lines(
@@ -70,6 +107,14 @@ mod tests {
         all.sort_unstable();
         all.dedup();
         assert_eq!(all.len(), 30, "a cell was visited twice");
+        let [below, above] = cells.halves().expect("more than one cell");
+        let halves = below
+            .lines([1, 5, 30, 120])
+            .chain(above.lines([1, 5, 30, 120]));
+        let mut parts: Vec<usize> = halves.flat_map(|(line, _)| line).collect();
+        parts.sort_unstable();
+        assert_eq!(parts, all, "halves share nothing and leave nothing out");
+        assert_eq!(LevelBox::default().halves(), None);
         assert_eq!(LevelBox::default().lines([1, 1, 1, 1]).count(), 1);
     }
 }

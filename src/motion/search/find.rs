@@ -1,6 +1,7 @@
 //! The search itself: the cheapest pair of trellis nodes, exactly, with few pairs visited.
 
 use super::bound::{Best, Depths, Slopes};
+use super::boxes::LevelBox;
 use super::class::{FeatureError, SearchClass};
 use super::side::{Side, cells_at_most};
 use super::tables::{DistanceTables, Form};
@@ -175,6 +176,7 @@ pub struct Search {
     pub(super) blocks: Vec<f64>,
     pub(super) pairs: Vec<Depths>,
     pub(super) slopes: Slopes,
+    pub(super) stack: Vec<[LevelBox; 2]>,
     /// `w B` of the source node at hand.
     pub(super) row: Vec<f64>,
     /// Cost of a dissimilarity per m^2, and the largest distance that is similar enough.
@@ -222,6 +224,8 @@ impl Search {
                 [source.references(), target.references()],
                 [&source, &target].map(|class| cells_at_most(class, options.delta_w)),
             ),
+            // A division leaves one half behind, and no box is divided more often than it has levels.
+            stack: Vec::with_capacity(1024),
             row: vec![0.0; target.references()],
             distance_weight: 0.0,
             most_distance: 0.0,

@@ -19,8 +19,7 @@ pub(super) struct Row {
     pub(super) t: f64,
     pub(super) at: Between,
     pub(super) cells: LevelBox,
-    /// The cheapest cell and its cost; infinite when none is soon enough.
-    pub(super) first: usize,
+    /// Cost of its cheapest node; infinite when none is soon enough.
     pub(super) cost: f64,
 }
 
@@ -268,7 +267,6 @@ impl Side {
             t,
             at: class.between(t),
             cells,
-            first: 0,
             cost: f64::INFINITY,
         });
     }
@@ -329,7 +327,7 @@ impl Side {
             let spread = &mut self.spread[row * n..(row + 1) * n];
             let within = &mut self.within[row * n * n..(row + 1) * n * n];
             within_at(class, at, spread, within);
-            let mut best = (f64::INFINITY, 0);
+            let mut best = f64::INFINITY;
             for (line, _) in cells.lines(self.strides) {
                 for cell in line {
                     let node = row * self.stride + cell;
@@ -352,12 +350,10 @@ impl Side {
                         cost = f64::INFINITY;
                     }
                     self.cost[node] = cost;
-                    if cost < best.0 {
-                        best = (cost, cell);
-                    }
+                    best = best.min(cost);
                 }
             }
-            (self.rows[row].cost, self.rows[row].first) = best;
+            self.rows[row].cost = best;
         }
     }
 
@@ -376,42 +372,44 @@ impl Side {
     /// Puts in place of every node's cost what `other(cost, extra)` says, keeping the costs aside.
     pub(super) fn swap_costs(&mut self, other: &dyn Fn(f64, f64) -> f64) {
         for row in 0..self.rows.len() {
-            let mut best = (f64::INFINITY, 0);
+            let mut best = f64::INFINITY;
             for (line, _) in self.rows[row].cells.lines(self.strides) {
                 for cell in line {
                     let node = row * self.stride + cell;
                     self.own[node] = self.cost[node];
                     self.cost[node] = other(self.cost[node], self.extra[node]);
-                    if self.cost[node] < best.0 {
-                        best = (self.cost[node], cell);
-                    }
+                    best = best.min(self.cost[node]);
                 }
             }
-            (self.rows[row].cost, self.rows[row].first) = best;
+            self.rows[row].cost = best;
         }
     }
 
     /// Undoes [`Side::swap_costs`].
     pub(super) fn restore_costs(&mut self) {
         for row in 0..self.rows.len() {
-            let mut best = (f64::INFINITY, 0);
+            let mut best = f64::INFINITY;
             for (line, _) in self.rows[row].cells.lines(self.strides) {
                 for cell in line {
                     let node = row * self.stride + cell;
                     self.cost[node] = self.own[node];
-                    if self.cost[node] < best.0 {
-                        best = (self.cost[node], cell);
-                    }
+                    best = best.min(self.cost[node]);
                 }
             }
-            (self.rows[row].cost, self.rows[row].first) = best;
+            self.rows[row].cost = best;
         }
     }
 
-    /// `cost + gradient . w` of all nodes of a row into `out` (by cell); the least and its cell.
-    pub(super) fn tangent(&self, row: usize, gradient: &[f64], out: &mut [f64]) -> (f64, usize) {
-        let mut best = (f64::INFINITY, self.rows[row].first);
-        for (line, _) in self.rows[row].cells.lines(self.strides) {
+    /// `cost + gradient . w` of the nodes in a box of a row into `out` (by cell); the least and its cell.
+    pub(super) fn tangent(
+        &self,
+        row: usize,
+        cells: &LevelBox,
+        gradient: &[f64],
+        out: &mut [f64],
+    ) -> (f64, usize) {
+        let mut best = (f64::INFINITY, cells.middle(self.strides));
+        for (line, _) in cells.lines(self.strides) {
             let out = &mut out[line.clone()];
             let node = row * self.stride;
             out.copy_from_slice(&self.cost[node + line.start..node + line.end]);
