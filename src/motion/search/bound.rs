@@ -6,9 +6,9 @@ use super::find::Search;
 use super::side::Side;
 
 /// Steps towards a better bound for two depths, at most.
-const STEPS: usize = 3;
+const STEPS: usize = 4;
 /// So many pairs are visited rather than bounded again.
-const FEW_PAIRS: usize = 128;
+const FEW_PAIRS: usize = 256;
 
 /// The best pair so far.
 #[derive(Copy, Clone, Debug)]

@@ -2,7 +2,8 @@
 
 use super::bound::{Best, Depths, Slopes};
 use super::boxes::LevelBox;
-use super::class::{FeatureError, SearchClass};
+use super::class::SearchClass;
+use super::clips::FeatureError;
 use super::side::{Side, cells_at_most};
 use super::tables::{DistanceTables, Form};
 use super::{FRAMES_PER_SECOND, MAX_PARAMETERS, State};

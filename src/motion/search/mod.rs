@@ -13,8 +13,8 @@
 //!
 //! The paper minimises a similarity in (4.6); it can only mean a dissimilarity, so `E_S = kappa (1 - s)`.
 //!
-//! All is done on plain arrays of Euclidean features, so that any body can use it: [`class`] holds the
-//! features of a class and its distances within, [`weight_map`] leads from parameters to blend weights,
+//! All is done on plain arrays of Euclidean features, so that any body can use it: [`clips`] are
+//! what goes in, [`class`] holds the features of a class and its distances within, [`weight_map`] leads from parameters to blend weights,
 //! [`tables`] has the distances of an edge and the two forms of the similarity of blends, [`find`] is
 //! the search, [`stored`] the baseline with transition points fixed beforehand, [`calibrate`] finds kappa.
 //!
@@ -51,6 +51,7 @@ mod bound;
 mod boxes;
 pub mod calibrate;
 pub mod class;
+pub mod clips;
 pub mod find;
 pub mod reach;
 pub mod robot;
@@ -61,7 +62,8 @@ pub mod tables;
 pub mod weight_map;
 
 pub use calibrate::{Calibration, calibrate};
-pub use class::{ClassSpec, ClipFeatures, FeatureError, SearchClass, Synthesis};
+pub use class::SearchClass;
+pub use clips::{ClassSpec, ClipFeatures, FeatureError, Synthesis};
 pub use find::{Cost, Found, NoTransition, OptionsError, Search, SearchOptions, Target, Waypoint};
 pub use stored::{StoredFound, StoredPoint, StoredTransitions};
 pub use tables::{DistanceTables, Form};

@@ -1,6 +1,7 @@
 //! Classes of a robot's clips for the search: joint positions as lengths, and the animator's blend.
 
-use super::class::{ClassSpec, FeatureError, SearchClass, Synthesis};
+use super::class::SearchClass;
+use super::clips::{ClassSpec, FeatureError, Synthesis};
 use crate::motion::class::{ClassError, Example};
 use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::limbs::timelines;

@@ -7,7 +7,8 @@
 
 use super::State;
 use super::blocks::{across_at, dot, row_times, within_at, without_spread};
-use super::class::{FeatureError, SearchClass, squared};
+use super::class::{SearchClass, squared};
+use super::clips::FeatureError;
 
 /// How the similarity of two blends is had from tables.
 #[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
