@@ -47,6 +47,10 @@ fn the_performance_plays_every_class_and_feet_do_not_slide() {
     );
     assert!(played.iter().all(|n| *n > 100), "{names:?}");
     assert!(stances > 200, "{stances} stances");
-    assert!(worst_m < 2e-3, "a foot slid {:.2} mm in one stance", 1e3 * worst_m);
+    assert!(
+        worst_m < 2e-3,
+        "a foot slid {:.2} mm in one stance",
+        1e3 * worst_m
+    );
     assert_eq!(held_back, 0, "the envelope acted");
 }

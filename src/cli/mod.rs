@@ -47,7 +47,7 @@ enum Command {
     Character(character::CharacterArgs),
     /// Pose mapping: the performer's pose itself drives a body; suggest, learn, apply, study
     Map(map::MapArgs),
-    /// Motion classes: which clips belong together, how they align
+    /// The motion graph: build classes, show it, check it, compare ways to find transitions
     Graph(graph::GraphArgs),
     /// Look at and set up servos on a bus
     Bus(bus::BusArgs),

@@ -17,7 +17,7 @@ use crate::gesture::{
 };
 use crate::motion::Animator;
 use crate::motion::class::MotionClass;
-use crate::motion::clip::ClipKind;
+use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
 use crate::motion::mapping::DirectClass;
@@ -333,6 +333,17 @@ impl Character {
                 config_name: self.config_name.clone(),
             },
         )
+    }
+
+    /// Start node and edges (from, to) of the motion graph, as indices of [`Character::classes`].
+    pub fn graph(&self) -> (usize, &[(usize, usize)]) {
+        (self.graph.0, &self.graph.1)
+    }
+
+    /// The clip of the layer of this name.
+    pub fn layer_clip(&self, name: &str) -> Option<&Clip> {
+        let layer = self.layers.iter().find(|l| l.name == name)?;
+        Some(&layer.clip)
     }
 
     /// Names of the layers, in order.

@@ -46,6 +46,11 @@ pub(super) struct ChannelParts {
 }
 
 impl ClassParts {
+    /// Example clips with their parameters; none for a pose map.
+    pub fn examples(&self) -> &[Example] {
+        &self.examples
+    }
+
     /// Names of the example clips, in the order of the class's weights.
     pub fn clip_names(&self) -> Vec<String> {
         self.examples.iter().map(|e| e.clip.name.clone()).collect()

@@ -17,7 +17,7 @@ use crate::motion::range::JointRange;
 pub(super) struct LayerParts {
     pub(super) name: String,
     source: Source,
-    clip: Clip,
+    pub(super) clip: Clip,
     joints: Option<Vec<String>>,
     frequency_hz: Option<f64>,
     idle_only: bool,

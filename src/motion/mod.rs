@@ -22,6 +22,7 @@ pub mod mapping;
 pub mod node;
 pub mod pins;
 pub mod range;
+pub mod search;
 mod smooth;
 mod spline;
 pub mod suggest;
