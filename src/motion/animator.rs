@@ -1,6 +1,7 @@
 //! The animator: gesture waves and channels in, one pose out.
 
 use super::class::{Drive, Played};
+use super::edge::{Choice, EdgeSearch};
 use super::graph::{Ask, Event, Graph, Plan, Transition, TransitionCounts};
 use super::inertia::Inertia;
 use super::layer::{Layer, LayerInput};
@@ -17,6 +18,10 @@ pub struct Animator {
     graph: Graph,
     layers: Vec<Layer>,
     pins: Option<PinnedFeet>,
+    /// Nodes x nodes: searches of the edges that have one.
+    searches: Vec<Option<Box<EdgeSearch>>>,
+    /// What the last search chose.
+    choice: Option<Choice>,
     inertia: Inertia,
     /// What each coordinate of a difference may be moved by transitions, per second and squared.
     fastest: Vec<(f64, f64)>,
@@ -70,6 +75,8 @@ impl Animator {
             inertia: Inertia::new(space.as_ref()),
             fastest,
             pins: None,
+            searches: (0..n * n).map(|_| None).collect(),
+            choice: None,
             played: vec![Played::default(); n],
             asks: vec![Ask::with(0.0); n],
             classes,
@@ -106,6 +113,20 @@ impl Animator {
         self
     }
 
+    /// Chooses transitions from node `from` to node `to` by `search`, in place of a blend.
+    pub fn with_search(mut self, from: usize, to: usize, search: EdgeSearch) -> Self {
+        let nodes = self.classes.len();
+        if from < nodes && to < nodes {
+            self.searches[from * nodes + to] = Some(Box::new(search));
+        }
+        self
+    }
+
+    /// What the last transition search chose, while its transition is awaited or just made.
+    pub fn choice(&self) -> Option<Choice> {
+        self.choice
+    }
+
     /// The body's pose space.
     pub fn space(&self) -> &dyn PoseSpace {
         self.space.as_ref()
@@ -133,7 +154,7 @@ impl Animator {
     /// `out`. Allocates nothing.
     pub fn step(&mut self, drives: &[Drive], input: &LayerInput<'_>, dt_s: f64, out: &mut [f64]) {
         self.play_classes(drives, dt_s);
-        let event = self.step_graph(dt_s);
+        let event = self.step_graph(drives, dt_s);
         let len = self.space.len();
         let active = self.graph.active();
         let entering = self
@@ -152,7 +173,7 @@ impl Animator {
             None => out.copy_from_slice(&self.poses[of(active)]),
         }
         if let Event::Jumped { to } = event {
-            self.take_up_jump(to, out);
+            self.take_up_jump(to, &drives[to], dt_s, out);
         }
         self.inertia.step(self.space.as_ref(), dt_s, out);
         if dt_s > 0.0 {
@@ -189,8 +210,9 @@ impl Animator {
         }
     }
 
-    fn step_graph(&mut self, dt_s: f64) -> Event {
+    fn step_graph(&mut self, drives: &[Drive], dt_s: f64) -> Event {
         let len = self.space.len();
+        let nodes = self.classes.len();
         let Self {
             graph,
             asks,
@@ -198,9 +220,20 @@ impl Animator {
             space,
             difference,
             fastest,
+            searches,
+            choice,
+            classes,
             ..
         } = self;
         let mut plan = |from: usize, to: usize| {
+            let both = (classes[from].clips(), classes[to].clips());
+            if let (Some(search), (Some(source), Some(target))) =
+                (&mut searches[from * nodes + to], both)
+            {
+                let (t, now) = source.now();
+                *choice = search.choose(t, now, target.wanted(&drives[to])).ok();
+                return choice.map_or(Plan::Refuse, |c| Plan::Jump { wait_s: c.wait_s });
+            }
             space.diff(
                 &poses[from * len..(from + 1) * len],
                 &poses[to * len..(to + 1) * len],
@@ -210,14 +243,49 @@ impl Animator {
                 span_s: eased_span_s(difference, fastest),
             }
         };
-        graph.step(asks, dt_s, &mut plan)
+        let waited = graph.transition();
+        let event = graph.step(asks, dt_s, &mut plan);
+        self.follow_routes(event, waited);
+        event
     }
 
-    /// Fades what entering `to` at once leaves between what was shown and `pose`.
-    fn take_up_jump(&mut self, to: usize, pose: &[f64]) {
+    /// Sends the source of a transition on its way when one began, and off it when it is over.
+    fn follow_routes(&mut self, event: Event, waited: Option<Transition>) {
+        let nodes = self.classes.len();
+        let waits = self.graph.transition().filter(|t| t.jump_in_s.is_some());
+        if let (Event::Began { to }, Some(_)) = (event, waits) {
+            let from = self.graph.active();
+            if let (Some(search), Some(class)) = (
+                &self.searches[from * nodes + to],
+                self.classes[from].clips_mut(),
+            ) {
+                search.route(class.route_mut());
+                class.follow_route();
+            }
+        } else if let (Some(before), None) = (waited, waits)
+            && let Some(class) = self.classes[before.from].clips_mut()
+        {
+            class.leave_route();
+        }
+    }
+
+    /// Fades what entering `to` at once leaves between what was shown and `pose`, the pose now played.
+    fn take_up_jump(&mut self, to: usize, drive: &Drive, dt_s: f64, pose: &mut [f64]) {
         let len = self.space.len();
         let of = to * len..(to + 1) * len;
-        // The last two steps of both: how the shown motion went, and how the entered one would have.
+        if let (Some(choice), Some(class)) = (self.choice.take(), self.classes[to].clips_mut()) {
+            class.enter(choice.entry);
+            class.show(true, drive);
+            // The step before the entry does not show; it tells how fast the entered motion goes.
+            class.step(
+                self.space.as_ref(),
+                *drive,
+                0.0,
+                &mut self.last_poses[of.clone()],
+            );
+            self.played[to] = class.step(self.space.as_ref(), *drive, dt_s, pose);
+            self.poses[of.clone()].copy_from_slice(pose);
+        }
         self.inertia.take_up(
             self.space.as_ref(),
             (&self.shown, &self.shown_before),

@@ -9,6 +9,7 @@ mod cycle;
 mod path;
 
 use super::clip::{Clip, ClipKind, RootAdvance};
+use super::edge::RoutePoint;
 use super::range::{JointRange, Steepness};
 use super::smooth::Follower;
 use super::weights::{Parameters, Weights};
@@ -94,6 +95,8 @@ pub struct MotionClass {
     /// Examples x limbs: where in the clip the limb carries weight.
     contacts: Vec<Contact>,
     state: State,
+    /// The way to the exit of a transition that was chosen, while it is followed.
+    route: Route,
     /// The class is active or being entered.
     shown: bool,
     // Work space, so that a step allocates nothing.
@@ -109,6 +112,36 @@ enum Contact {
     Always,
     /// From touch-down, a fraction of the clip, for another fraction.
     During { from: f64, duty: f64 },
+}
+
+/// A way through amplitude and frequency to the point where the class is left.
+#[derive(Clone, Debug, Default)]
+struct Route {
+    points: Vec<RoutePoint>,
+    at_s: f64,
+}
+
+impl Route {
+    /// Most points of a way.
+    const MOST: usize = 64;
+
+    /// Amplitude and frequency `dt_s` further on; `None` when no way is followed.
+    fn step(&mut self, dt_s: f64) -> Option<(f64, f64)> {
+        let last = *self.points.last()?;
+        self.at_s += dt_s;
+        let after = self.points.iter().position(|p| p.0 > self.at_s);
+        let (a, b) = match after {
+            Some(0) => (self.points[0], self.points[0]),
+            Some(k) => (self.points[k - 1], self.points[k]),
+            None => (last, last),
+        };
+        let share = if b.0 > a.0 {
+            (self.at_s - a.0) / (b.0 - a.0)
+        } else {
+            0.0
+        };
+        Some((a.1 + share * (b.1 - a.1), a.2 + share * (b.2 - a.2)))
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -228,6 +261,51 @@ impl MotionClass {
                 // The gesture was released: the next one plays it anew.
                 self.state.ended = false;
             }
+        }
+    }
+
+    /// Where the class is: fraction of its cycle or path, and its parameters.
+    pub(super) fn now(&self) -> (f64, Parameters) {
+        let amplitude = match self.kind {
+            ClipKind::Cycle => self.state.amplitude.value,
+            ClipKind::Path => 1.0,
+        };
+        let wish = self.wish(amplitude, self.state.frequency.value);
+        (self.shown_phase() / TAU, wish)
+    }
+
+    /// The parameters that `drive` asks for.
+    pub(super) fn wanted(&self, drive: &Drive) -> Parameters {
+        match self.kind {
+            ClipKind::Cycle => self.wish(awake(drive.amplitude).min(1.0), drive.frequency_hz),
+            ClipKind::Path => self.wish(1.0, 0.0),
+        }
+    }
+
+    /// Room for the way to an exit; to be filled, then [`MotionClass::follow_route`].
+    pub(super) fn route_mut(&mut self) -> &mut Vec<RoutePoint> {
+        &mut self.route.points
+    }
+
+    /// Goes along the way that was put into [`MotionClass::route_mut`], by the clock.
+    pub(super) fn follow_route(&mut self) {
+        self.route.at_s = 0.0;
+    }
+
+    /// Is driven as ever again.
+    pub(super) fn leave_route(&mut self) {
+        self.route.points.clear();
+    }
+
+    /// Enters the class at fraction `at` of its cycle or path.
+    pub(super) fn enter(&mut self, at: f64) {
+        match (self.options.play, self.kind) {
+            (Play::Once, _) => {
+                self.state.progress = at.clamp(0.0, 1.0);
+                self.state.ended = false;
+            }
+            (_, ClipKind::Cycle) => self.state.phase = TAU * at.rem_euclid(1.0),
+            (_, ClipKind::Path) => self.state.amplitude = Follower::at(at.clamp(0.0, 1.0)),
         }
     }
 

@@ -7,6 +7,7 @@
 pub mod animator;
 pub mod class;
 pub mod clip;
+pub mod edge;
 pub mod gait;
 pub mod gait_frames;
 mod gait_paths;

@@ -88,6 +88,22 @@ impl Node {
         }
     }
 
+    /// The class of clips, if it is one.
+    pub(super) fn clips(&self) -> Option<&MotionClass> {
+        match self {
+            Node::Clips(class) => Some(class),
+            Node::Direct(_) => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub(super) fn clips_mut(&mut self) -> Option<&mut MotionClass> {
+        match self {
+            Node::Clips(class) => Some(class),
+            Node::Direct(_) => None,
+        }
+    }
+
     /// How much `drive` asks for this node, for the graph.
     pub(super) fn activation(&self, drive: &Drive) -> f64 {
         match self {

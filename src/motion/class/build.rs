@@ -1,6 +1,6 @@
 //! Building a class: kinds checked, weights fitted, limbs and contacts brought together.
 
-use super::{Contact, Example, MotionClass, Play, State};
+use super::{Contact, Example, MotionClass, Play, Route, State};
 use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::limbs::timelines;
 use crate::motion::range::{JointRange, Steepness};
@@ -193,6 +193,10 @@ impl MotionClass {
             },
             sampled: vec![0.0; count * coordinates],
             weights: vec![0.0; count],
+            route: Route {
+                points: Vec::with_capacity(Route::MOST),
+                at_s: 0.0,
+            },
             shown: false,
             examples,
         })

@@ -21,7 +21,7 @@ impl MotionClass {
     pub(super) fn step_cycle(
         &mut self,
         space: &dyn PoseSpace,
-        drive: Drive,
+        mut drive: Drive,
         dt_s: f64,
         out: &mut [f64],
     ) -> Played {
@@ -34,13 +34,21 @@ impl MotionClass {
         } else {
             0.0
         };
+        let on_route = self.route.step(dt_s);
+        let wanted = on_route.map_or(wanted, |(amplitude, _)| amplitude);
         let state = &mut self.state;
+        let mut coming_hz: f64 = 0.0;
+        if let Some((amplitude, frequency_hz)) = on_route {
+            // The way to an exit was chosen pose by pose: it is gone as it is, by the clock.
+            state.amplitude = Follower::at(amplitude);
+            state.frequency = Follower::at(frequency_hz);
+            drive.phase_rad = state.phase + TAU * frequency_hz * dt_s;
+        }
         let amplitude = state
             .amplitude
             .step(wanted.min(1.0), 9.0, 1.7, dt_s)
             .max(0.0);
-        let mut coming_hz: f64 = 0.0;
-        if performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
+        if on_route.is_none() && performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
             let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
             if amplitude < AT_REST {
                 // Nothing moves yet: begin at the tempo that is shown.
