@@ -31,7 +31,7 @@ body crouches (the layer of that name). The same random requests (present state,
 online-N searches trellises of depth N, stored-N has the N best transition points fixed beforehand,
 exhaustive-10 visits every pair of nodes of depth 10. Columns: mean cost (E_S + lambda E_L), its part for
 dissimilarity, mean latency in seconds, median time of a request in microseconds (best of several passes; with
-three parameters exhaustive-10 takes minutes). kappa, the weight of dissimilarity, is calibrated on other requests so
+three parameters exhaustive-10 takes a second a request). kappa, the weight of dissimilarity, is calibrated on other requests so
 that E_S is 1 to 2.5 times lambda E_L, as in the paper.";
 
 #[derive(Args, Debug)]
