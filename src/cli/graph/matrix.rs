@@ -47,7 +47,7 @@ pub(super) fn matrix_svg(
         target.references() * target.frames(),
     );
     // Each axis has its own scale: a class of one clip beside one of nine is still to be read.
-    let side = |count: usize| (CELL * count as f64).min(LONGER).max(LEAST);
+    let side = |count: usize| (CELL * count as f64).clamp(LEAST, LONGER);
     let (high, wide) = (side(rows), side(columns));
     let (cell_h, cell_w) = (high / rows as f64, wide / columns as f64);
     let longest = |class: &SearchClass| {

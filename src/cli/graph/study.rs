@@ -20,18 +20,18 @@ use std::sync::Arc;
 
 pub(super) const EXAMPLES: &str = "Examples:
   handwave graph study
-      the built-in quadruped's walk and trot to a bound, one parameter (tempo)
+      the built-in quadruped's walk and trot to a pace, one parameter (tempo)
   handwave graph study --parameters 2 --out study
       two parameters (size of the steps and tempo); a plot goes into the folder
   handwave graph study configs/quadruped.toml --requests 50 --seed 7 --json
 
 From the start class's clips to those of another class: the first one with an edge from it whose clips repeat,
-or, on a robot with legs, a bound written for it. --parameters 1: tempo; 2: size and tempo; 3: also how deep the
+or, on a robot with legs, a pace written for it. --parameters 1: tempo; 2: size and tempo; 3: also how deep the
 body crouches (the layer of that name). The same random requests (present state, wished state) go to all methods:
 online-N searches trellises of depth N, stored-N has the N best transition points fixed beforehand,
 exhaustive-10 visits every pair of nodes of depth 10. Columns: mean cost (E_S + lambda E_L), its part for
 dissimilarity, mean latency in seconds, median time of a request in microseconds (best of several passes; with
-three parameters exhaustive-10 takes minutes). kappa, the weight of dissimilarity, is calibrated on other requests so
+three parameters exhaustive-10 takes a second a request). kappa, the weight of dissimilarity, is calibrated on other requests so
 that E_S is 1 to 2.5 times lambda E_L, as in the paper.";
 
 #[derive(Args, Debug)]
@@ -134,7 +134,7 @@ fn pair(
         .find(|class| repeats(class.examples()));
     let (name, examples) = match other {
         Some(class) => (class.name.clone(), class.examples().to_vec()),
-        None => ("bound".to_owned(), bound(character).map_err(bad)?),
+        None => ("pace".to_owned(), pace(character).map_err(bad)?),
     };
     let levers = lever_arms(&character.model);
     let made = |name: &str, examples: &[Example]| {
@@ -173,8 +173,8 @@ fn pair(
     Ok((made(&from.name, from.examples())?, made(&name, &examples)?))
 }
 
-/// A bound for the character's legs: short and long, slow and quick.
-fn bound(character: &Character) -> Result<Vec<Example>, String> {
+/// A pace for the character's legs: short and long, slow and quick.
+fn pace(character: &Character) -> Result<Vec<Example>, String> {
     let no_legs = |e| {
         format!(
             "no second class whose clips repeat, and no legs to write a gait for ({e}); add such a class and an edge to it"
@@ -199,8 +199,8 @@ fn bound(character: &Character) -> Result<Vec<Example>, String> {
     let mut examples = Vec::new();
     for (size, share) in [("short", 0.5), ("long", 1.0)] {
         for (tempo, frequency_hz) in [("slow", 0.9), ("quick", 1.6)] {
-            let name = format!("bound_{size}_{tempo}");
-            let mut description = GaitDescription::preset(&name, GaitName::Bound);
+            let name = format!("pace_{size}_{tempo}");
+            let mut description = GaitDescription::preset(&name, GaitName::Pace);
             description.frequency_hz = Some(frequency_hz);
             let full = 0.25 * legs.first().map_or(0.3, |l| l.length(&character.model));
             description.stride_m = Some(share * full);

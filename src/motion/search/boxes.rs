@@ -24,9 +24,9 @@ impl LevelBox {
 
     /// The smallest box around this one and a cell.
     pub(super) fn with(mut self, levels: Levels) -> Self {
-        for d in 0..MAX_PARAMETERS {
-            self.low[d] = self.low[d].min(levels[d]);
-            self.high[d] = self.high[d].max(levels[d]);
+        for (d, level) in levels.into_iter().enumerate() {
+            self.low[d] = self.low[d].min(level);
+            self.high[d] = self.high[d].max(level);
         }
         self
     }

@@ -11,27 +11,30 @@ pub struct Reach {
 
 /// Follows the edges (from, to) of a graph of `nodes` nodes from `start`, forwards and backwards.
 pub fn reach(nodes: usize, start: usize, edges: &[(usize, usize)]) -> Reach {
-    let follow = |step: &dyn Fn(&(usize, usize)) -> (usize, usize)| {
-        let mut seen = vec![false; nodes];
-        if let Some(first) = seen.get_mut(start) {
-            *first = true;
-        }
-        // A way is never longer than there are nodes.
-        for _ in 0..nodes {
-            for (from, to) in edges.iter().map(step) {
-                if from < nodes && to < nodes && seen[from] {
-                    seen[to] = true;
-                }
-            }
-        }
-        seen
-    };
-    let out = follow(&|edge| *edge);
-    let back = follow(&|(from, to)| (*to, *from));
+    let back: Vec<(usize, usize)> = edges.iter().map(|(from, to)| (*to, *from)).collect();
+    let out = follow(nodes, start, edges);
+    let back = follow(nodes, start, &back);
     Reach {
         unreachable: (0..nodes).filter(|n| !out[*n]).collect(),
         dead_ends: (0..nodes).filter(|n| out[*n] && !back[*n]).collect(),
     }
+}
+
+/// Nodes that can be reached along the edges.
+fn follow(nodes: usize, start: usize, edges: &[(usize, usize)]) -> Vec<bool> {
+    let mut seen = vec![false; nodes];
+    if let Some(first) = seen.get_mut(start) {
+        *first = true;
+    }
+    // A way is never longer than there are nodes.
+    for _ in 0..nodes {
+        for (from, to) in edges {
+            if *from < nodes && *to < nodes && seen[*from] {
+                seen[*to] = true;
+            }
+        }
+    }
+    seen
 }
 
 #[cfg(test)]

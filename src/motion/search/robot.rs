@@ -176,14 +176,12 @@ impl ClipBlend {
         self.free.len() + usize::from(self.added.is_some())
     }
 
-    /// Names of the clips.
+    /// Names of the clips that take part, and of the added path.
     pub fn clip_names(&self) -> Vec<&str> {
-        let added = self.added.iter().map(|c| c.name.as_str());
-        self.clips
-            .iter()
-            .map(|c| c.name.as_str())
-            .chain(added)
-            .collect()
+        let at_rest = self.low[0] < self.least_amplitude;
+        let count = self.weights.len() + usize::from(at_rest);
+        let clips = self.clips.iter().take(count);
+        clips.chain(&self.added).map(|c| c.name.as_str()).collect()
     }
 
     /// Names of the parameters with their ranges.

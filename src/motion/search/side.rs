@@ -213,7 +213,11 @@ impl Side {
             let axis = &mut self.axes[d];
             axis.clear();
             // Not-a-number is taken for 0.
-            let p = parameters[d].max(0.0).min(1.0);
+            let p = if parameters[d].is_nan() {
+                0.0
+            } else {
+                parameters[d].clamp(0.0, 1.0)
+            };
             match step {
                 Some(step) if d < class.parameters() => {
                     // A remainder within rounding belongs to the end.

@@ -17,9 +17,11 @@ const DEPTH: usize = 10;
 const STORED: [usize; 3] = [1, 5, 10];
 /// Requests that kappa is calibrated with; others than those of the study.
 const CALIBRATION_REQUESTS: usize = 20;
+/// The same where a search takes long.
+const FEW_CALIBRATION_REQUESTS: usize = 6;
 /// Passes over all requests, of which the quickest counts for each.
 const PASSES: usize = 5;
-/// Nodes of a trellis from which on all pairs take seconds and are visited once.
+/// Parameters from which on all pairs take seconds and are visited once.
 const MANY_PARAMETERS: usize = 3;
 
 /// What is compared.
@@ -81,7 +83,14 @@ pub fn study(
         Search::new(source.clone(), target.clone(), tables.clone(), options)
     };
     let mut judge = search_at(DEPTH, options.search.kappa)?;
-    let others = random_requests(&judge, CALIBRATION_REQUESTS, !options.seed);
+    let parameters = source.parameters().max(target.parameters());
+    let many = parameters >= MANY_PARAMETERS;
+    let count = if many {
+        FEW_CALIBRATION_REQUESTS
+    } else {
+        CALIBRATION_REQUESTS
+    };
+    let others = random_requests(&judge, count, !options.seed);
     let calibration = calibrate(&mut judge, &others)?;
     let mut stored: Vec<(usize, StoredTransitions)> = STORED
         .iter()
@@ -115,8 +124,7 @@ pub fn study(
         });
         rows.push(named(format!("stored-{count}"), row));
     }
-    let nodes = source.parameters().max(target.parameters());
-    let passes = if nodes >= MANY_PARAMETERS { 1 } else { PASSES };
+    let passes = if many { 1 } else { PASSES };
     let (row, all) = measure(&requests, passes, clock, &mut |from, to| {
         online(judge.exhaustive(from, &Target::State(*to)))
     });

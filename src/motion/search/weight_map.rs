@@ -161,9 +161,9 @@ mod tests {
             hat.weights(&p, &mut out);
             prop_assert!(out.iter().all(|w| *w >= 0.0));
             prop_assert!((out.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-            for d in 0..3 {
+            for (d, p) in p.iter().enumerate() {
                 let mean: f64 = out.iter().enumerate().map(|(k, w)| w * hat.place(k)[d]).sum();
-                prop_assert!((mean - p[d].clamp(0.0, 1.0)).abs() < 1e-12, "axis {d}: {mean}");
+                prop_assert!((mean - p.clamp(0.0, 1.0)).abs() < 1e-12, "axis {d}: {mean}");
             }
         }
     }
