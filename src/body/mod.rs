@@ -11,6 +11,7 @@ mod robot_feet;
 mod root;
 mod skeleton;
 mod skeleton_space;
+mod skin;
 
 pub use feet::Feet;
 pub use joint_space::{BODY, JointSpace};
@@ -18,6 +19,7 @@ pub use robot_feet::RobotFeet;
 pub use root::{RootAdvance, RootPose};
 pub use skeleton::{Skeleton, SkeletonError, SkeletonJoint};
 pub use skeleton_space::SkeletonSpace;
+pub use skin::{Influence, SkinBone, SkinError, SkinnedMesh};
 
 use std::ops::Range;
 
