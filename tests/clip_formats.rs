@@ -139,9 +139,9 @@ fn the_fox_s_skin_is_the_reference_where_its_joints_are_as_bound() {
     let file = parse_gltf(&fox(), &centimetres());
     let off = off_reference(&file);
     assert!(off < 1e-6, "{off} m off as bound");
-    // At rest with the hip where the file has it (26.7 and 42.9 units below a turned root).
-    let (off, size) = at_rest(&file, [-0.42938, 0.0, 0.26748]);
-    println!("at rest {off} m from the reference, size {size:?}");
+    // At rest with the hip where the file has it: 42.94 units up, 26.75 behind.
+    let (off, size) = at_rest(&file, [-0.267485628, 0.0, 0.4293807218]);
+    assert!(off < 1e-6, "{off} m off at rest");
     assert!(
         (size[0] - 1.55).abs() < 0.02
             && (size[1] - 0.25).abs() < 0.02
@@ -149,6 +149,32 @@ fn the_fox_s_skin_is_the_reference_where_its_joints_are_as_bound() {
         "the fox is {size:.2?} m, as its file says 1.55, 0.25, 0.79"
     );
     assert_eq!(file.skin.as_ref().expect("a skin").positions().len(), 1728);
+}
+
+#[test]
+fn the_walking_fox_s_skin_lies_where_another_program_puts_it() {
+    // Vertices of Walk at 0.253 s and of Run at 0 s, file axes and units, from an evaluation of the
+    // file in double precision that shares no code with this one.
+    let known = [
+        (1, 15, 0, [2.35037258, 33.68526006, -22.72693056]),
+        (1, 15, 500, [7.81808141, 25.05203407, -40.36916298]),
+        (1, 15, 1000, [7.08717147, 27.22669596, 20.61695424]),
+        (2, 0, 1700, [8.24929277, 12.88325856, -31.28992409]),
+    ];
+    let file = parse_gltf(&fox(), &centimetres());
+    let mesh = file.skin.as_ref().expect("a skin");
+    for (take, frame, vertex, [x, y, z]) in known {
+        let take = &file.takes[take];
+        let mut frames = vec![Isometry3::identity(); file.skeleton.len()];
+        file.skeleton.frames(&take.poses[frame], &mut frames);
+        let mut matrices = vec![Matrix4::zeros(); mesh.bones().len()];
+        mesh.bone_matrices(&frames, &mut matrices);
+        let mut out = vec![Point3::origin(); mesh.positions().len()];
+        mesh.deform(&matrices, &mut out);
+        let place = take.roots[frame].to_world(out[vertex]);
+        let off = (place - Point3::new(0.01 * z, 0.01 * x, 0.01 * y)).norm();
+        assert!(off < 1e-6, "{}, vertex {vertex}: {off} m off", take.name);
+    }
 }
 
 #[test]
