@@ -1,5 +1,6 @@
 //! A file's axes: which way is up, which way the body faces, and the rotation into ours.
 
+use super::error::ImportFault;
 use super::raw::Raw;
 use crate::base::suggest::hint;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -83,6 +84,18 @@ impl Axes {
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows))
     }
 
+    /// The axes, if forward is level.
+    pub(super) fn checked(self) -> Result<Self, ImportFault> {
+        if self.up.index == self.forward.index {
+            return Err(ImportFault::element(
+                "the axes",
+                format!("up {}, forward {}", self.up, self.forward),
+                "two different axes",
+            ));
+        }
+        Ok(self)
+    }
+
     /// The axes of a motion whose up is `up`: facing `forward` where it is given, else by left and
     /// right joints, else by travel, else `default`. The second value says how it was found.
     ///
@@ -92,30 +105,28 @@ impl Axes {
         forward: Option<Axis>,
         default: Axis,
         raw: &Raw,
-    ) -> (Self, &'static str) {
+    ) -> Result<(Self, &'static str), ImportFault> {
         let with = |forward| Self { up, forward };
         if let Some(forward) = forward {
-            return (with(forward), "as told");
+            return Ok((with(forward).checked()?, "as told"));
         }
         let flat = |v: Vector3<f64>| v - up.vector() * v.dot(&up.vector());
         let places = raw.rest_places();
         let size = places.iter().fold(0.0, |m: f64, p| m.max(p.norm()));
         let left = flat(left_of_right(raw, &places));
         if left.norm() > 1e-3 * size {
-            return (
-                with(nearest(left.cross(&up.vector()), up)),
-                "left and right joints",
-            );
+            let ahead = nearest(left.cross(&up.vector()), up);
+            return Ok((with(ahead), "left and right joints"));
         }
         if let Some(way) = travel(raw, up, size) {
-            return (with(nearest(way, up)), "direction of travel");
+            return Ok((with(nearest(way, up)), "direction of travel"));
         }
         let axis = if default.index == up.index {
             Axis::new((up.index + 1) % 3, false)
         } else {
             default
         };
-        (with(axis), "the format's usual axis")
+        Ok((with(axis), "the format's usual axis"))
     }
 }
 

@@ -12,7 +12,7 @@ mod tree;
 use super::axes::{Axes, Axis};
 use super::error::ImportFault;
 use super::raw::{Raw, RawFrame, RawJoint};
-use super::{ImportOptions, check_frames};
+use super::{ImportOptions, check_size};
 use crate::base::suggest::hint;
 use crate::body::{Skeleton, SkinnedMesh};
 use crate::motion::take::Take;
@@ -84,7 +84,7 @@ impl GltfFile {
             options.forward,
             Axis::new(2, false),
             facing,
-        );
+        )?;
         if options.forward.is_none() {
             warnings.push(format!("faces {} ({how})", axes.forward));
         }
@@ -186,8 +186,9 @@ fn raw(
     let duration_s = animation.end_s - animation.start_s;
     let intervals = (duration_s * rate_hz).round().max(1.0);
     if !(intervals < super::MAX_FRAMES as f64) {
-        check_frames(super::MAX_FRAMES + 1)?;
+        check_size(super::MAX_FRAMES + 1, 1)?;
     }
+    check_size(intervals as usize + 1, joints.nodes.len())?;
     raw.dt_s = if duration_s > 0.0 {
         duration_s / intervals
     } else {

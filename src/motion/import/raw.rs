@@ -76,12 +76,21 @@ impl Raw {
     /// The heading is how far the root is turned about the vertical from rest, with the least of other
     /// turning (the twist of swing and twist); places keep the origin of the file.
     pub fn take(&self, skeleton: &Arc<Skeleton>, axes: Axes, origin: &str) -> Take {
+        self.scaled_take(skeleton, axes, skeleton.unit_m, origin)
+    }
+
+    /// [`Raw::take`] of what is in metres already, whatever unit the skeleton's own file had.
+    pub fn take_in_metres(&self, skeleton: &Arc<Skeleton>, axes: Axes, origin: &str) -> Take {
+        self.scaled_take(skeleton, axes, 1.0, origin)
+    }
+
+    fn scaled_take(&self, skeleton: &Arc<Skeleton>, axes: Axes, unit_m: f64, origin: &str) -> Take {
         let turn = axes.rotation();
         let from_rest = Skeleton::rotation(&skeleton.rest_pose([0.0; 3]), 0).inverse();
         let mut poses: Vec<Vec<f64>> = Vec::with_capacity(self.frames.len());
         let mut roots: Vec<RootPose> = Vec::with_capacity(self.frames.len());
         for frame in &self.frames {
-            let place = turn * frame.place * skeleton.unit_m;
+            let place = turn * frame.place * unit_m;
             let root = frame.rotations.first().copied().unwrap_or_default();
             let root = turn * root;
             let yaw_rad = unwrapped(twist_z(&(root * from_rest)), roots.last());
