@@ -7,6 +7,7 @@
 pub mod animator;
 pub mod class;
 pub mod clip;
+pub mod export;
 pub mod gait;
 pub mod gait_frames;
 pub mod graph;
