@@ -133,7 +133,7 @@ fn warn_open(take: &Take, args: &ImportArgs) {
         && gap > OPEN_RAD
     {
         warn(format_args!(
-            "{}: the cycle does not close: {name} ends {gap:.3} from where it began; move --start or --end",
+            "{}: the cycle does not close: {name} ends {gap:.3} from where it began; --start and --end may mark a better one",
             args.file.display()
         ));
     }
