@@ -170,7 +170,7 @@ fn skeleton(
     if grid.uneven {
         warnings.push(format!("resampled evenly to {} frames", grid.frames));
     }
-    check_size(grid.frames, rows.len())?;
+    grid.check(&times, rows.len())?;
     let frames = uneven::frames(&times, &frames, &grid);
     let raw = Raw {
         name: name.to_owned(),
