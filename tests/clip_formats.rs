@@ -117,7 +117,7 @@ fn off_reference(file: &GltfFile) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The mesh at rest: largest distance from the reference, and the size of the reference along x, y, z.
+/// The mesh at rest: largest distance from the reference, and its size along x, y, z.
 fn at_rest(file: &GltfFile, root: [f64; 3]) -> (f64, [f64; 3]) {
     let mesh = file.skin.as_ref().expect("a skin");
     let mut frames = vec![Isometry3::identity(); file.skeleton.len()];
@@ -129,7 +129,7 @@ fn at_rest(file: &GltfFile, root: [f64; 3]) -> (f64, [f64; 3]) {
     mesh.deform(&matrices, &mut out);
     let off = (out.iter().zip(mesh.positions())).map(|(a, b)| (a - b).norm());
     let size = [0, 1, 2].map(|i| {
-        let values = mesh.positions().iter().map(|p| p[i]);
+        let values = out.iter().map(|p| p[i]);
         let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
         high - low
     });
@@ -200,6 +200,12 @@ fn a_man_from_embedded_buffers_under_a_turned_armature_stands_upright() {
     );
     let off = off_reference(&file);
     assert!(off < 1e-6, "{off} m off as bound");
+    // Nothing has a name, so that the feet say where ahead is: then he is wider than deep.
+    let (_, [deep, wide, tall]) = at_rest(&file, [0.0, 0.0, 0.68]);
+    assert!(
+        deep < 0.5 && wide > 1.0 && (1.4..1.6).contains(&tall),
+        "{deep:.2} m deep, {wide:.2} wide, {tall:.2} tall"
+    );
 }
 
 /// Largest distance of joints of the same name between two takes, over every frame of both.

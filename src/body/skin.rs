@@ -139,7 +139,8 @@ impl SkinnedMesh {
         })
     }
 
-    /// The reference surface, metres, our axes.
+    /// The reference surface, metres, our axes, as it was bound: it need not stand upright, nor be the
+    /// surface of the skeleton at rest.
     pub fn positions(&self) -> &[Point3<f64>] {
         &self.positions
     }

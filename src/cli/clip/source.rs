@@ -16,7 +16,7 @@ pub(super) struct SourceArgs {
     /// Which axis of the file points up: y, z, x, or one with a minus (default: that of the format).
     #[arg(long, allow_hyphen_values = true, value_name = "AXIS")]
     up: Option<Axis>,
-    /// Which axis the body at rest faces, or auto: by left and right joints, else by travel.
+    /// Which axis the body at rest faces, or auto: by left and right joints, else by feet or travel.
     #[arg(
         long,
         allow_hyphen_values = true,

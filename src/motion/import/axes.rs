@@ -97,9 +97,10 @@ impl Axes {
     }
 
     /// The axes of a motion whose up is `up`: facing `forward` where it is given, else by left and
-    /// right joints, else by travel, else `default`. The second value says how it was found.
+    /// right joints, else by the feet, else by travel, else `default`. The second value says how it was
+    /// found.
     ///
-    /// Pairs of joints come before travel: who walks backwards faces the other way.
+    /// The body comes before its travel: who walks backwards faces the other way.
     pub(super) fn find(
         up: Axis,
         forward: Option<Axis>,
@@ -117,6 +118,10 @@ impl Axes {
         if left.norm() > 1e-3 * size {
             let ahead = nearest(left.cross(&up.vector()), up);
             return Ok((with(ahead), "left and right joints"));
+        }
+        let ahead = flat(toes(raw, &places, up.vector()));
+        if ahead.norm() > 0.02 * size {
+            return Ok((with(nearest(ahead, up)), "where the feet point"));
         }
         if let Some(way) = travel(raw, up, size) {
             return Ok((with(nearest(way, up)), "direction of travel"));
@@ -151,6 +156,18 @@ fn left_of_right(raw: &Raw, places: &[Vector3<f64>]) -> Vector3<f64> {
         }
     }
     sum
+}
+
+/// Sum of the last bones of what stands lowest at rest: toes.
+fn toes(raw: &Raw, places: &[Vector3<f64>], up: Vector3<f64>) -> Vector3<f64> {
+    let heights = places.iter().map(|p| p.dot(&up));
+    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(l, h), z| (l.min(z), h.max(z)));
+    let joints = raw.joints.iter().enumerate();
+    let is_tip = |i: usize| !raw.joints.iter().any(|j| j.parent == Some(i));
+    joints
+        .filter(|(i, _)| is_tip(*i) && places[*i].dot(&up) < low + 0.1 * (high - low))
+        .filter_map(|(i, joint)| Some(places[i] - places[joint.parent?]))
+        .fold(Vector3::zeros(), |sum, bone| sum + bone)
 }
 
 /// A name in lower case without numbers, so that sides can be compared.
