@@ -8,41 +8,15 @@ use handwave::motion::import::gltf::GltfFile;
 use handwave::motion::import::{ImportOptions, open};
 use handwave::motion::take::{Take, TakeBody};
 use handwave::robot::RobotModel;
-use nalgebra::{Isometry3, Matrix4, Point3};
+use nalgebra::{Isometry3, Matrix4, Point3, Rotation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use support::data::shared_data;
-
-fn fox() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/avatars/fox.glb")
-}
-
-fn centimetres() -> ImportOptions {
-    ImportOptions {
-        unit: Some("cm".parse().expect("a unit")),
-        ..ImportOptions::default()
-    }
-}
-
-fn skeleton(take: &Take) -> &Arc<Skeleton> {
-    match &take.body {
-        TakeBody::Skeleton(skeleton) => skeleton,
-        other => panic!("no skeleton but {other:?}"),
-    }
-}
+use support::motion::{TINY_BVH, centimetres, fox, places, skeleton, through_file};
 
 fn parse_gltf(path: &Path, options: &ImportOptions) -> GltfFile {
     let bytes = std::fs::read(path).expect("the file");
     GltfFile::parse(&bytes, "test", path.parent(), options).expect("a good glTF")
-}
-
-/// Places of all joints in the world at frame `k`.
-fn places(take: &Take, k: usize) -> Vec<Point3<f64>> {
-    let skeleton = skeleton(take);
-    let mut frames = vec![Isometry3::identity(); skeleton.len()];
-    skeleton.frames(&take.poses[k], &mut frames);
-    let at = |f: &Isometry3<f64>| take.roots[k].to_world(Point3::from(f.translation.vector));
-    frames.iter().map(at).collect()
 }
 
 #[test]
@@ -106,9 +80,15 @@ fn a_fragment_selects_one_animation_and_a_wrong_one_lists_all() {
 /// Largest distance of a vertex from the reference surface when every joint is as it was bound.
 fn off_reference(file: &GltfFile) -> f64 {
     let mesh = file.skin.as_ref().expect("a skin");
-    // Frames as bound: the inverses of the bind matrices, which need not be rigid.
+    // Frames as bound: rigid ones, metres and our axes, which undo the bind matrices.
     let bound: Vec<Matrix4<f64>> = (mesh.bones().iter())
-        .map(|b| b.inverse_bind.try_inverse().expect("invertible") * b.inverse_bind)
+        .map(|bone| {
+            let frame = bone.inverse_bind.try_inverse().expect("invertible");
+            let turn = frame.fixed_view::<3, 3>(0, 0).into_owned();
+            let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
+            let place = frame.fixed_view::<3, 1>(0, 3).into_owned();
+            Isometry3::from_parts(place.into(), turn).to_homogeneous() * bone.inverse_bind
+        })
         .collect();
     let mut out = vec![Point3::origin(); mesh.positions().len()];
     mesh.deform(&bound, &mut out);
@@ -222,61 +202,6 @@ fn apart(a: &Take, b: &Take) -> f64 {
     });
     frames.fold(0.0, f64::max)
 }
-
-/// Writes `text` to a file of that name and reads it as a motion.
-fn through_file(name: &str, bytes: &[u8], options: &ImportOptions) -> Take {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join(name);
-    std::fs::write(&path, bytes).expect("written");
-    open(&path, options).expect("readable").takes.remove(0)
-}
-
-fn message(name: &str, bytes: &[u8], options: &ImportOptions) -> String {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join(name);
-    std::fs::write(&path, bytes).expect("written");
-    match open(&path, options) {
-        Ok(_) => panic!("{name} was read"),
-        Err(error) => error.to_string(),
-    }
-}
-
-const TINY_BVH: &str = "HIERARCHY
-ROOT World
-{
-  OFFSET 0 0 0
-  CHANNELS 3 Zrotation Xrotation Yrotation
-  JOINT Hips
-  {
-    OFFSET 0 90 0
-    CHANNELS 6 Xposition Yposition Zposition Yrotation Xrotation Zrotation
-    JOINT Leg_L
-    {
-      OFFSET 10 -5 0
-      CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-      End Site
-      {
-        OFFSET 0 -80 5
-      }
-    }
-    JOINT Leg_R
-    {
-      OFFSET -10 -5 0
-      CHANNELS 3 Zrotation Xrotation Yrotation
-      End Site
-      {
-        OFFSET 0 -80 5
-      }
-    }
-  }
-}
-MOTION
-Frames: 3
-Frame Time: 0.1
-0 0 0   0 90 0   0 0 0   10 -5 0 0 30 0   0 -30 0
-0 0 0   5 91 20  45 0 0  10 -5 0 0 90 0   0 0 10
-0 0 0   10 90 40 90 10 5  10 -5 0 0 0 20   90 0 0
-";
 
 #[test]
 fn a_bvh_keeps_its_joints_its_heading_and_its_right_angles() {
@@ -616,258 +541,4 @@ fn a_robot_in_gltf_has_its_links_where_its_kinematics_puts_them() {
         }
     }
     assert!(worst < 1e-5, "a link is {worst} m off");
-}
-
-const TINY_ASF: &str = "# a leg
-:version 1.10
-:units
-  mass 1.0
-  length 0.45
-  angle deg
-:root
-  order TX TY TZ RX RY RZ
-  axis XYZ
-  position 0 0 0
-  orientation 0 0 0
-:bonedata
-  begin
-    id 1
-    name lfemur
-    direction 0 -1 0
-    length 8
-    axis 0 0 20 XYZ
-    dof rx ry rz
-    limits (-160.0 20.0)
-           (-70.0 70.0)
-           (-60.0 70.0)
-  end
-  begin
-    id 2
-    name ltibia
-    direction 0 -1 0
-    length 7
-    axis 0 0 0 XYZ
-    dof rx
-    limits (-10.0 170.0)
-  end
-:hierarchy
-  begin
-    root lfemur
-    lfemur ltibia
-  end
-";
-
-const TINY_AMC: &str = "#!OML:ASF leg.asf
-:FULLY-SPECIFIED
-:DEGREES
-1
-root 0 15 0 0 0 0
-lfemur 0 0 0
-ltibia 90
-2
-root 0 15 2 0 90 0
-lfemur 0 0 0
-ltibia 0
-";
-
-/// Writes skeleton and motion side by side and reads the motion.
-fn leg(asf: &str, amc: &str) -> Result<Take, String> {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("leg.asf"), asf).expect("written");
-    let path = folder.path().join("leg_01.amc");
-    std::fs::write(&path, amc).expect("written");
-    let imported = open(&path, &ImportOptions::default()).map_err(|e| e.to_string())?;
-    Ok(imported.takes[0].clone())
-}
-
-#[test]
-fn a_leg_of_an_asf_bends_about_its_bone_s_axes() {
-    let take = leg(TINY_ASF, TINY_AMC).expect("good");
-    let unit = 0.0254 / 0.45;
-    // The shin turned by 90 degrees about x of the file: its end goes from down to backwards (-z),
-    // which is -x of ours. The root is 15 units up, the knee 8 below it.
-    let at = places(&take, 0);
-    let tip = at[skeleton(&take).joint("ltibia_end").expect("a tip")];
-    let off = (tip - Point3::new(-7.0 * unit, 0.0, 7.0 * unit)).norm();
-    assert!(off < 1e-9, "the tip is at {tip:?}, {off} m off");
-    let turned = take.roots[1].yaw_rad.to_degrees();
-    assert!((turned - 90.0).abs() < 1e-9 && (take.roots[1].x_m - 2.0 * unit).abs() < 1e-12);
-}
-
-#[test]
-fn faults_of_files_name_the_place_what_was_found_and_what_is_allowed() {
-    let none = ImportOptions::default();
-    let bvh = TINY_BVH.replace("10 -5 0 0 30 0", "10 -5 0 0 x 0");
-    let json = |frames: &str| {
-        format!("{{\"LoopMode\": \"Wrap\", \"FrameDuration\": 0.02, \"Frames\": [{frames}]}}")
-    };
-    let level = "0, 0, 0.3, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1";
-    let long = json(&format!("[{level}], [{level}, 4]"));
-    let short = json("[0, 0, 0.3]");
-    let zero = json(&format!(
-        "[{}]",
-        level.replacen("0, 0, 0, 1,", "0, 0, 0, 0,", 1)
-    ));
-    let cases: [(&str, &str, &str); 13] = [
-        ("a.bvh", &bvh, "line 33: found `x` in frame 1"),
-        ("a.csv", "", "header `t,<joint>"),
-        ("a.csv", "t,a,a\n0,1,2\n", "column 3 called \"a\""),
-        (
-            "a.csv",
-            "t,a\n0,1\n0.1,nan\n",
-            "line 3: found \"nan\"; allowed: a number for a",
-        ),
-        ("a.csv", "t,a\n0,1\n0,1\n", "line 3: found t 0 after 0"),
-        ("a.csv", "t,a\n0,1,2\n", "line 2: found 3 cells"),
-        ("a.csv", "t,a.rx,a.ry,a.rz\n0,1,2,3\n", "--skeleton FILE"),
-        ("a.json", &long, "frame 1: found 20 numbers"),
-        ("a.json", &short, "3 numbers each, with FrameDuration"),
-        ("a.json", &zero, "frame 0: found a quaternion of length 0"),
-        (
-            "a.txt",
-            "{\"Frames\": [[\"a\"]]}",
-            "not the JSON of a motion",
-        ),
-        ("a.xyz", "what is this", "no known extension"),
-        (
-            "a.gltf",
-            "{\"asset\": {\"version\": \"2.0\"}, \"nodes\": []}",
-            "no skin and no animated node",
-        ),
-    ];
-    for (name, text, expected) in cases {
-        let found = message(name, text.as_bytes(), &none);
-        assert!(
-            found.contains(expected),
-            "{name}: {found}\nwithout: {expected}"
-        );
-    }
-    for (asf, amc, expected) in [
-        (
-            TINY_ASF.replace("dof rx ry rz", "dof rx rq"),
-            TINY_AMC.into(),
-            "line 19: found \"rq\"",
-        ),
-        (
-            TINY_ASF.replace("lfemur ltibia", "lfemur tibia"),
-            TINY_AMC.into(),
-            "bone \"tibia\"",
-        ),
-        (
-            TINY_ASF.replace("    lfemur ltibia\n", ""),
-            TINY_AMC.into(),
-            "bone ltibia that hangs on nothing",
-        ),
-        (
-            TINY_ASF.into(),
-            TINY_AMC.replace("ltibia 90", "ltibia 90 1"),
-            "line 7: found 2 numbers for ltibia",
-        ),
-        (
-            TINY_ASF.into(),
-            TINY_AMC.replace("ltibia 90\n", ""),
-            "line 4: found frame 1 without bone ltibia",
-        ),
-        (
-            TINY_ASF.into(),
-            TINY_AMC.replace("ltibia 0", "rtibia 0"),
-            "line 11: found bone \"rtibia\"",
-        ),
-    ] {
-        let found = leg(&asf, &amc).expect_err(expected);
-        assert!(found.contains(expected), "{found}\nwithout: {expected}");
-    }
-    let glb = std::fs::read(fox()).expect("the fox");
-    let cut = message("fox.glb", &glb[..90_000], &none);
-    assert!(
-        cut.contains("BIN chunk: found the end of the file"),
-        "{cut}"
-    );
-    let sideways = ImportOptions {
-        up: Some("z".parse().expect("an axis")),
-        forward: Some("-z".parse().expect("an axis")),
-        ..centimetres()
-    };
-    let found = message("a.bvh", TINY_BVH.as_bytes(), &sideways);
-    assert!(found.contains("two different axes"), "{found}");
-}
-
-/// A text or binary with some bytes cut, changed or doubled.
-fn spoiled(good: &[u8], edits: &[(u32, u8, u8)]) -> Vec<u8> {
-    let mut bytes = good.to_vec();
-    for (at, kind, value) in edits {
-        if bytes.is_empty() {
-            break;
-        }
-        let at = *at as usize % bytes.len();
-        match kind % 5 {
-            0 => bytes.truncate(at),
-            1 => bytes[at] = *value,
-            2 => bytes.insert(at, b"0-.{}[],eE\n \"9"[usize::from(*value) % 14]),
-            3 => {
-                let end = (at + usize::from(*value)).min(bytes.len());
-                bytes.drain(at..end);
-            }
-            _ => {
-                let end = (at + usize::from(*value)).min(bytes.len());
-                let copy = bytes[at..end].to_vec();
-                bytes.splice(at..at, copy);
-            }
-        }
-    }
-    bytes
-}
-
-proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig {
-        failure_persistence: None,
-        ..Default::default()
-    })]
-
-    #[test]
-    fn no_spoiled_file_makes_the_reader_panic(
-        edits in proptest::collection::vec(proptest::prelude::any::<(u32, u8, u8)>(), 1..6),
-    ) {
-        let folder = tempfile::tempdir().expect("a folder");
-        let read = |name: &str, bytes: &[u8], options: &ImportOptions| {
-            let path = folder.path().join(name);
-            std::fs::write(&path, bytes).expect("written");
-            if let Ok(imported) = open(&path, options) {
-                for take in &imported.takes {
-                    assert!(take.poses.iter().flatten().all(|v| v.is_finite()), "{name}");
-                    let _ = (to_bvh(take), to_csv(take));
-                }
-            }
-        };
-        let none = ImportOptions::default();
-        let humanoid = format!(
-            "{{\"Loop\": \"wrap\", \"Frames\": [[0.1, {}], [0, {}]]}}",
-            "1, ".repeat(42) + "1", "0.5, ".repeat(42) + "1"
-        );
-        let walk = "t,x,y,z,Hips.rx,Hips.ry,Hips.rz\n0,0,0,1,0,0,0\n0.1,0.1,0,1,0,0,1\n0.4,0.1,0,1,0,0,1\n";
-        read("a.bvh", &spoiled(TINY_BVH.as_bytes(), &edits), &none);
-        std::fs::write(folder.path().join("leg.asf"), TINY_ASF).expect("written");
-        read("leg.amc", &spoiled(TINY_AMC.as_bytes(), &edits), &none);
-        std::fs::write(folder.path().join("leg.asf"), spoiled(TINY_ASF.as_bytes(), &edits)).expect("written");
-        read("leg.amc", TINY_AMC.as_bytes(), &none);
-        read("a.json", &spoiled(humanoid.as_bytes(), &edits), &none);
-        std::fs::write(folder.path().join("bones.bvh"), TINY_BVH).expect("written");
-        let bones = ImportOptions { skeleton: Some(folder.path().join("bones.bvh")), ..none.clone() };
-        read("a.csv", &spoiled(walk.as_bytes(), &edits), &bones);
-    }
-
-    #[test]
-    fn no_spoiled_gltf_makes_the_reader_panic(
-        edits in proptest::collection::vec(proptest::prelude::any::<(u32, u8, u8)>(), 1..4),
-        text in proptest::prelude::any::<bool>(),
-    ) {
-        static SMALL: std::sync::OnceLock<(Vec<u8>, Vec<u8>)> = std::sync::OnceLock::new();
-        let (binary, json) = SMALL.get_or_init(|| {
-            let take = through_file("tiny.bvh", TINY_BVH.as_bytes(), &centimetres());
-            let scene = skeleton_to_gltf(&take, None).expect("a skeleton");
-            (scene.to_glb(), scene.to_json().into_bytes())
-        });
-        let bytes = spoiled(if text { json } else { binary }, &edits);
-        let _ = GltfFile::parse(&bytes, "spoiled", None, &ImportOptions::default());
-    }
 }
