@@ -394,7 +394,7 @@ fn laikago_s_joints_are_those_of_its_urdf_and_its_feet_reach_the_ground() {
             let q: Vec<f64> = order.iter().map(|i| pose[*i]).collect();
             let body = Isometry3::from_parts(
                 nalgebra::Translation3::new(0.0, 0.0, pose[14]),
-                nalgebra::UnitQuaternion::from_euler_angles(pose[15], pose[16], 0.0),
+                UnitQuaternion::from_euler_angles(pose[15], pose[16], 0.0),
             );
             for (low, foot) in lowest.iter_mut().zip(&feet) {
                 let z = (body * model.link_pose(*foot, &q)).translation.z;
@@ -532,7 +532,7 @@ fn a_robot_in_gltf_has_its_links_where_its_kinematics_puts_them() {
     let mut worst = 0.0_f64;
     for (k, pose) in take.poses.iter().enumerate() {
         let at = places(again, k);
-        let body = nalgebra::UnitQuaternion::from_euler_angles(0.05, -0.1, 0.0);
+        let body = UnitQuaternion::from_euler_angles(0.05, -0.1, 0.0);
         for (link, name) in model.links.iter().enumerate() {
             let joint = file.skeleton.joint(name).expect("the link");
             let local = body * Point3::from(model.link_pose(link, pose).translation.vector);
