@@ -13,6 +13,7 @@ pub mod graph;
 pub mod layer;
 mod limbs;
 pub mod mapping;
+pub mod metrics;
 pub mod node;
 pub mod range;
 mod smooth;
