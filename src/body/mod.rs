@@ -13,6 +13,7 @@ mod side;
 mod skeleton;
 mod skeleton_feet;
 mod skeleton_space;
+mod skin;
 
 pub use feet::Feet;
 pub use joint_space::{BODY, JointSpace};
@@ -22,6 +23,7 @@ pub use side::{Side, mirrored, other_side};
 pub use skeleton::{Skeleton, SkeletonError, SkeletonJoint};
 pub use skeleton_feet::{SkeletonFeet, SkeletonFeetError, SkeletonLeg};
 pub use skeleton_space::SkeletonSpace;
+pub use skin::{Influence, SkinBone, SkinError, SkinnedMesh};
 
 use std::ops::Range;
 

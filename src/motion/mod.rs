@@ -10,6 +10,7 @@ pub mod clip;
 pub mod gait;
 pub mod gait_frames;
 pub mod graph;
+pub mod import;
 pub mod layer;
 mod limbs;
 pub mod mapping;
