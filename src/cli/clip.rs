@@ -1,7 +1,8 @@
 //! `handwave clip`: author gaits for a legged URDF; look into a clip.
 
+mod info;
+
 use super::{ExitStatus, Failure, say, warn};
-use crate::motion::clip::{ClipFile, ClipKind};
 use crate::motion::gait::{GaitDescription, GaitName};
 use crate::motion::gait_frames::{Authored, author, outside_limits};
 use crate::motion::range::JointRange;
@@ -28,14 +29,9 @@ A gait is a preset (walk, trot, pace, bound, stand) or a description file, in wh
 poses of the body can also be strung together (bow, crouch). What the joints are too
 slow for is shortened, with a note; --strict refuses it instead.")]
     Gait(Box<GaitArgs>),
-    /// Show what is in a clip: joints, frames, cycle, travel, limbs, ranges
-    Info {
-        /// The clip
-        file: PathBuf,
-        /// Print one JSON object
-        #[arg(long)]
-        json: bool,
-    },
+    /// Show what a motion is: cycle, speed, contacts, symmetry, quality
+    #[command(after_help = info::EXAMPLES)]
+    Info(info::InfoArgs),
 }
 
 #[derive(Args, Debug)]
@@ -85,7 +81,7 @@ struct GaitArgs {
 pub fn run(args: &ClipArgs) -> Result<ExitStatus, Failure> {
     match &args.command {
         ClipCommand::Gait(args) => gait(args),
-        ClipCommand::Info { file, json } => info(file, *json),
+        ClipCommand::Info(args) => info::run(args),
     }
 }
 
@@ -200,57 +196,6 @@ fn report(args: &GaitArgs, authored: &Authored, model: &RobotModel) -> Result<Ex
         .map_err(|e| Failure::input(e.to_string()))?;
     for line in outside_limits(&clip, model) {
         say(format_args!("warning: {line}"));
-    }
-    Ok(ExitStatus::Done)
-}
-
-fn info(path: &Path, json: bool) -> Result<ExitStatus, Failure> {
-    let file = ClipFile::from_json(&read(path)?)
-        .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
-    if json {
-        let summary = serde_json::json!({
-            "name": file.name, "kind": file.kind, "origin": file.origin,
-            "frames": file.frames.len(), "joints": file.joints,
-            "frequency_hz": file.frequency_hz, "root": file.root, "segments": file.segments,
-        });
-        say(format_args!("{summary}"));
-        return Ok(ExitStatus::Done);
-    }
-    let kind = match file.kind {
-        ClipKind::Cycle => "cycle",
-        ClipKind::Path => "path",
-    };
-    say(format_args!(
-        "{} ({kind}, {} frames) {}",
-        file.name,
-        file.frames.len(),
-        file.origin
-    ));
-    if file.kind == ClipKind::Cycle {
-        say(format_args!(
-            "made for {:.2} Hz; per cycle {:.3} m forwards, {:.3} m left, {:.3} rad",
-            file.frequency_hz, file.root.forward_m, file.root.left_m, file.root.yaw_rad
-        ));
-    }
-    for s in &file.segments {
-        say(format_args!(
-            "  limb {:<12} phase {:.2}  duty {:.2}  {}",
-            s.name,
-            s.phase,
-            s.duty,
-            s.joints.join(" ")
-        ));
-    }
-    for (j, joint) in file.joints.iter().enumerate() {
-        let (low, high) = file
-            .frames
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), f| {
-                (lo.min(f[j]), hi.max(f[j]))
-            });
-        say(format_args!(
-            "  joint {joint:<20} {low:>7.3} .. {high:>6.3} rad"
-        ));
     }
     Ok(ExitStatus::Done)
 }

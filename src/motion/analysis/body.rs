@@ -1,8 +1,7 @@
 //! What analysis needs of the body of a take: its pose space, its feet, and the joints of each limb.
 
 use super::AnalysisError;
-use crate::body::{Feet, JointSpace, PoseSpace, RobotFeet, RootPose, SkeletonFeet, SkeletonSpace};
-use crate::motion::clip::{ClipFile, ClipKind};
+use crate::body::{Feet, JointSpace, PoseSpace, RobotFeet, SkeletonFeet, SkeletonSpace};
 use crate::motion::take::{Take, TakeBody};
 use crate::robot::{Leg, RobotModel};
 use std::sync::Arc;
@@ -132,58 +131,5 @@ impl BodyModel {
     /// The robot, where it is known.
     pub fn model(&self) -> Option<&RobotModel> {
         self.model.as_ref()
-    }
-}
-
-/// A clip as a take: what importers give of other files. A cycle gets its first frame once more at its
-/// end, one cycle further; a path without a duration takes one second.
-pub fn take_of(clip: &ClipFile) -> Take {
-    let n = clip.frames.len();
-    let cycle = clip.kind == ClipKind::Cycle;
-    let intervals = if cycle { n } else { n.saturating_sub(1) }.max(1) as f64;
-    let duration_s = match clip.kind {
-        ClipKind::Cycle if clip.frequency_hz > 0.0 => 1.0 / clip.frequency_hz,
-        ClipKind::Path if clip.duration_s > 0.0 => clip.duration_s,
-        _ => 1.0,
-    };
-    let body = match &clip.skeleton {
-        Some(skeleton) => TakeBody::Skeleton(Arc::new(skeleton.clone())),
-        None if clip.body.is_empty() => TakeBody::Joints(clip.joints.clone()),
-        None => TakeBody::Floating(clip.joints.clone()),
-    };
-    let mut poses: Vec<Vec<f64>> = (clip.frames.iter().enumerate())
-        .map(|(k, frame)| {
-            let body = clip.body.get(k).into_iter().flatten();
-            frame.iter().chain(body).copied().collect()
-        })
-        .collect();
-    let mut roots: Vec<RootPose> = (0..n)
-        .map(|k| match clip.way.get(k) {
-            Some([x_m, y_m, yaw_rad]) => RootPose {
-                x_m: *x_m,
-                y_m: *y_m,
-                yaw_rad: *yaw_rad,
-            },
-            None => {
-                let mut root = RootPose::default();
-                root.travel(clip.root.scaled(k as f64 / intervals));
-                root
-            }
-        })
-        .collect();
-    if cycle && let (Some(first), Some(start)) = (poses.first().cloned(), roots.first().copied()) {
-        poses.push(first);
-        let mut end = start;
-        end.travel(clip.root);
-        roots.push(end);
-    }
-    Take {
-        name: clip.name.clone(),
-        origin: clip.origin.clone(),
-        dt_s: duration_s / intervals,
-        body,
-        poses,
-        roots,
-        wraps: cycle,
     }
 }

@@ -203,9 +203,8 @@ fn hysteresis(
     closed: bool,
 ) -> Vec<bool> {
     let swing = quantile(speeds.iter().copied(), SWING);
-    let slow = |limit: fn((f64, f64)) -> f64| {
-        (limit(SPEED) * swing).max(limit(TREMBLE_PER_S) * reach)
-    };
+    let slow =
+        |limit: fn((f64, f64)) -> f64| (limit(SPEED) * swing).max(limit(TREMBLE_PER_S) * reach);
     let (on, off) = (slow(|l| l.0), slow(|l| l.1));
     let mut contact = vec![false; world.len()];
     let mut stands = false;
@@ -291,4 +290,26 @@ fn duty(contact: &[bool], cycle: Option<&Cycle>) -> f64 {
     });
     let down = contact[..whole].iter().filter(|c| **c).count();
     down as f64 / whole.max(1) as f64
+}
+
+impl FootContact {
+    /// Share of contact in each of `cells` equal parts of the cycle, over all cycles of the take; without
+    /// a cycle over the take.
+    pub fn over(&self, cycle: Option<&Cycle>, cells: usize) -> Vec<f64> {
+        let n = self.contact.len();
+        let (mut down, mut all) = (vec![0.0; cells], vec![0.0; cells]);
+        let (start, frames) = cycle.map_or((0.0, n as f64), |c| (c.start as f64, c.frames));
+        // Finer than frames, so that no cell stays empty.
+        let fine = (4 * cells).div_ceil(frames as usize + 1).max(1);
+        for k in 0..n * fine {
+            let at = k as f64 / fine as f64;
+            let cell = ((at - start) / frames).rem_euclid(1.0) * cells as f64;
+            let cell = (cell as usize).min(cells.saturating_sub(1));
+            all[cell] += 1.0;
+            down[cell] += f64::from(u8::from(self.contact[k / fine]));
+        }
+        (down.iter().zip(all))
+            .map(|(d, a)| if a > 0.0 { d / a } else { 0.0 })
+            .collect()
+    }
 }

@@ -10,7 +10,7 @@ pub mod gait;
 pub mod mirror;
 pub mod travel;
 
-pub use body::{BodyModel, take_of};
+pub use body::BodyModel;
 pub use contact::{FootContact, Stance};
 pub use cycle::Cycle;
 pub use gait::Gait;
