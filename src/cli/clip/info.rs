@@ -202,6 +202,7 @@ impl Findings {
         match &self.found.cycle {
             Some(c) if c.closed => "cycle",
             Some(_) => "cycles",
+            None if self.take.wraps => "loop",
             None => "path",
         }
     }

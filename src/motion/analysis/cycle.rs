@@ -5,8 +5,8 @@
 //! are not looked at.
 
 use super::AnalysisError;
-use crate::body::PoseSpace;
-use crate::motion::take::Take;
+use crate::body::{PoseSpace, mirrored};
+use crate::motion::take::{Take, TakeBody};
 
 /// A cycle of a take.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -35,6 +35,10 @@ const AS_GOOD: f64 = 0.9;
 const MOVING: f64 = 0.6;
 /// Ends of a loop are this near each other, as a share of the motion's energy.
 const CLOSED: f64 = 0.04;
+/// Ends of a loop that was cut badly are this near each other.
+const NEARLY_CLOSED: f64 = 0.3;
+/// A loop that shows one round only and takes longer is a performance that comes back to its start.
+const LONGEST_ROUND_S: f64 = 2.5;
 /// Frames looked at in the first, coarse search.
 const COARSE: usize = 1200;
 
@@ -163,6 +167,10 @@ pub fn find(features: &Features, take: &Take) -> Result<Cycle, AnalysisError> {
     }
     let whole = n - 1;
     let closed = take.wraps && features.gap() < CLOSED;
+    // A single round has nothing to be compared with: short ones are taken for a cycle if their ends
+    // meet, or nearly meet and left and right move in turn.
+    let in_turn = || features.gap() < NEARLY_CLOSED && in_turn(features, take) > LEAST_LIKENESS;
+    let one_round = take.wraps && take.duration_s() < LONGEST_ROUND_S && (closed || in_turn());
     let cycle = |start: usize, frames: f64, likeness: f64, closed: bool| Cycle {
         start,
         frames,
@@ -179,7 +187,7 @@ pub fn find(features: &Features, take: &Take) -> Result<Cycle, AnalysisError> {
             }
             Ok(cycle(best_start(features, frames), frames, likeness, false))
         }
-        Err(_) if closed => Ok(cycle(0, whole as f64, 1.0 - features.gap(), true)),
+        Err(_) if one_round => Ok(cycle(0, whole as f64, 1.0 - features.gap(), true)),
         Err(likeness) => Err(not(likeness)),
     }
 }
@@ -225,6 +233,45 @@ fn lag(features: &Features, dt_s: f64) -> Result<(f64, f64), f64> {
         0.0
     };
     Ok((lag as f64 + offset, b))
+}
+
+/// How much the left is the mirrored right half a cycle later, over the whole take as one cycle: 1 is the
+/// same. Of skeletons by the places of joints, of robots by joint positions, whose sense on the two
+/// sides their means tell.
+fn in_turn(features: &Features, take: &Take) -> f64 {
+    let names: Vec<&str> = match &take.body {
+        TakeBody::Joints(names) | TakeBody::Floating(names) => {
+            names.iter().map(String::as_str).collect()
+        }
+        TakeBody::Skeleton(skeleton) => skeleton.joints.iter().map(|j| j.name.as_str()).collect(),
+    };
+    let n = features.len() - 1;
+    let (mut apart, mut energy) = (0.0, 0.0);
+    let mut compare = |a: usize, b: usize, sense: f64| {
+        for (k, row) in features.rows[..n].iter().enumerate() {
+            let other = sense * features.rows[(k + n / 2) % n][b];
+            apart += (row[a] - other).powi(2);
+            energy += row[a].powi(2) + other.powi(2);
+        }
+    };
+    for (i, j) in mirrored(&names)
+        .into_iter()
+        .enumerate()
+        .filter(|(i, j)| i < j)
+    {
+        match &take.body {
+            TakeBody::Skeleton(_) => {
+                for (axis, sense) in [1.0, -1.0, 1.0].into_iter().enumerate() {
+                    compare(3 * i + axis, 3 * j + axis, sense);
+                }
+            }
+            TakeBody::Joints(_) | TakeBody::Floating(_) => {
+                let mean = |c: usize| take.poses.iter().map(|p| p[c]).sum::<f64>();
+                compare(i, j, if mean(i) * mean(j) < 0.0 { -1.0 } else { 1.0 });
+            }
+        }
+    }
+    1.0 - apart / energy.max(1e-12)
 }
 
 /// The frame from which a cycle of `frames` ends nearest to where it began, in place and speed, judged

@@ -55,8 +55,9 @@ pub fn apart(a: f64, b: f64) -> f64 {
     d.min(1.0 - d)
 }
 
-/// Feet that touch down within this share of the cycle do so together.
-const TOGETHER: f64 = 0.12;
+/// Feet that touch down within this share of the cycle do so together: half of the quarter that is
+/// between the feet of an even walk.
+const TOGETHER: f64 = 0.125;
 /// Feet that touch down within this share follow each other.
 const NEAR: f64 = 0.28;
 
@@ -91,7 +92,7 @@ pub fn guess(feet: &[FootContact]) -> Option<Gait> {
         [apart(fl, rl), apart(fr, rr)],
     );
     let ends = [apart(fl, fr), apart(rl, rr)];
-    let all = |d: [f64; 2], limit: f64| d[0].max(d[1]) < limit;
+    let all = |d: [f64; 2], limit: f64| 0.5 * (d[0] + d[1]) < limit;
     Some(if all(ends, TOGETHER) {
         if all(sides, TOGETHER) {
             Gait::Pronk
