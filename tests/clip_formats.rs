@@ -3,9 +3,11 @@
 mod support;
 
 use handwave::body::{PoseSpace, Skeleton, SkeletonSpace};
+use handwave::motion::export::{robot_to_gltf, skeleton_to_gltf, to_bvh, to_csv};
 use handwave::motion::import::gltf::GltfFile;
 use handwave::motion::import::{ImportOptions, open};
 use handwave::motion::take::{Take, TakeBody};
+use handwave::robot::RobotModel;
 use nalgebra::{Isometry3, Matrix4, Point3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -198,4 +200,668 @@ fn a_man_from_embedded_buffers_under_a_turned_armature_stands_upright() {
     );
     let off = off_reference(&file);
     assert!(off < 1e-6, "{off} m off as bound");
+}
+
+/// Largest distance of joints of the same name between two takes, over every frame of both.
+fn apart(a: &Take, b: &Take) -> f64 {
+    assert_eq!(a.len(), b.len(), "frames");
+    let pairs: Vec<(usize, usize)> = (skeleton(a).joints.iter().enumerate())
+        .filter_map(|(i, joint)| Some((i, skeleton(b).joint(&joint.name)?)))
+        .collect();
+    assert_eq!(pairs.len(), skeleton(a).len(), "joints of {}", a.name);
+    let frames = (0..a.len()).map(|k| {
+        let (x, y) = (places(a, k), places(b, k));
+        let far = pairs.iter().map(|(i, j)| (x[*i] - y[*j]).norm());
+        far.fold(0.0, f64::max)
+    });
+    frames.fold(0.0, f64::max)
+}
+
+/// Writes `text` to a file of that name and reads it as a motion.
+fn through_file(name: &str, bytes: &[u8], options: &ImportOptions) -> Take {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).expect("written");
+    open(&path, options).expect("readable").takes.remove(0)
+}
+
+fn message(name: &str, bytes: &[u8], options: &ImportOptions) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).expect("written");
+    match open(&path, options) {
+        Ok(_) => panic!("{name} was read"),
+        Err(error) => error.to_string(),
+    }
+}
+
+const TINY_BVH: &str = "HIERARCHY
+ROOT World
+{
+  OFFSET 0 0 0
+  CHANNELS 3 Zrotation Xrotation Yrotation
+  JOINT Hips
+  {
+    OFFSET 0 90 0
+    CHANNELS 6 Xposition Yposition Zposition Yrotation Xrotation Zrotation
+    JOINT Leg_L
+    {
+      OFFSET 10 -5 0
+      CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+      End Site
+      {
+        OFFSET 0 -80 5
+      }
+    }
+    JOINT Leg_R
+    {
+      OFFSET -10 -5 0
+      CHANNELS 3 Zrotation Xrotation Yrotation
+      End Site
+      {
+        OFFSET 0 -80 5
+      }
+    }
+  }
+}
+MOTION
+Frames: 3
+Frame Time: 0.1
+0 0 0   0 90 0   0 0 0   10 -5 0 0 30 0   0 -30 0
+0 0 0   5 91 20  45 0 0  10 -5 0 0 90 0   0 0 10
+0 0 0   10 90 40 90 10 5  10 -5 0 0 0 20   90 0 0
+";
+
+#[test]
+fn a_bvh_keeps_its_joints_its_heading_and_its_right_angles() {
+    let centimetres = centimetres();
+    let take = through_file("tiny.bvh", TINY_BVH.as_bytes(), &centimetres);
+    let names: Vec<&str> = (skeleton(&take).joints.iter())
+        .map(|j| j.name.as_str())
+        .collect();
+    assert_eq!(
+        names,
+        ["Hips", "Leg_L", "Leg_L_end", "Leg_R", "Leg_R_end"],
+        "a still root folds in"
+    );
+    // Faces z of the file by its left and right legs, walks that way and turns to its left.
+    let [first, .., last] = &take.roots[..] else {
+        panic!("three frames")
+    };
+    let (x, y) = (last.x_m - first.x_m, last.y_m - first.y_m);
+    assert!(
+        (x - 0.4).abs() < 1e-9 && (y - 0.1).abs() < 1e-9,
+        "went {x}, {y} m"
+    );
+    let turned = (take.roots[1].yaw_rad - first.yaw_rad).to_degrees();
+    assert!((turned - 45.0).abs() < 1e-9, "turned by {turned} degrees");
+    let written = to_bvh(&take).expect("a skeleton");
+    let again = through_file("again.bvh", written.as_bytes(), &centimetres);
+    let off = apart(&take, &again);
+    assert!(off < 1e-6, "{off} m off after a round");
+}
+
+#[test]
+fn bvh_comes_back_as_it_went_and_agrees_with_the_pose_stream() {
+    let Some(folder) = shared_data("human_bvh") else {
+        return;
+    };
+    for name in [
+        "dataset-2_walk_normal_001",
+        "dataset-1_dash_happy_001",
+        "dataset-1_byebye_active_001",
+    ] {
+        let path = folder.join(format!("{name}.bvh"));
+        let take = open(&path, &centimetres()).expect("BVH").takes.remove(0);
+        let written = to_bvh(&take).expect("a skeleton");
+        let again = through_file("again.bvh", written.as_bytes(), &centimetres());
+        let off = apart(&take, &again);
+        assert!(off < 1e-6, "{name}: {off} m off after a round");
+        // The pose stream has its own kinematics: y up and facing z, in metres.
+        let (poses, _) = handwave::pose::Recording::read(&path).expect("BVH");
+        let mut worst = 0.0_f64;
+        for (k, sample) in poses.samples.iter().enumerate() {
+            let at = places(&take, k);
+            for (name, point) in poses.header.points.iter().zip(&sample.points) {
+                let [x, y, z] = point.expect("a place");
+                let joint = skeleton(&take).joint(name).expect("the same joints");
+                worst = worst.max((at[joint] - Point3::new(z, x, y)).norm());
+            }
+        }
+        println!("{name}: round {off:.1e} m, from the pose stream {worst:.1e} m");
+        assert!(worst < 1e-6, "{name}: {worst} m from the pose stream");
+    }
+}
+
+#[test]
+fn speeds_of_walks_and_runs_are_those_measured_elsewhere() {
+    let Some(data) = shared_data("human_cmu").and_then(|p| Some(p.parent()?.to_owned())) else {
+        return;
+    };
+    // Mean speed (m/s) and heights of the root (m), as the data's notes list them.
+    let rows = [
+        ("human_cmu/02_01.amc", 1.18, [0.93, 1.00]),
+        ("human_cmu/02_02.amc", 1.63, [0.90, 0.99]),
+        ("human_cmu/02_03.amc", 2.58, [0.90, 1.05]),
+        ("human_cmu/02_04.amc", f64::NAN, [0.73, 1.47]),
+        ("human_bvh/dataset-2_walk_normal_001.bvh", 1.11, [0.0, 0.0]),
+        ("human_bvh/dataset-2_walk_elderly_001.bvh", 0.74, [0.0, 0.0]),
+        ("human_bvh/dataset-2_run_normal_001.bvh", 3.60, [0.0, 0.0]),
+        ("human_joint/humanoid3d_walk.txt", 0.98, [0.0, 0.0]),
+        ("human_joint/humanoid3d_run.txt", 3.56, [0.0, 0.0]),
+        ("quadruped/laikago/dog_trot.txt", 1.75, [0.0, 0.0]),
+        ("quadruped/laikago/dog_pace.txt", 1.09, [0.0, 0.0]),
+        ("quadruped/a1/trot0.txt", 1.17, [0.0, 0.0]),
+        ("quadruped/a1/gallop_forward0.json", 1.99, [0.0, 0.0]),
+        ("quadruped/dog3d/dog3d_trot.txt", 2.40, [0.0, 0.0]),
+    ];
+    for (name, speed, [low, high]) in rows {
+        let take = open(&data.join(name), &ImportOptions::default())
+            .expect(name)
+            .takes
+            .remove(0);
+        let (Some(first), Some(last)) = (take.roots.first(), take.roots.last()) else {
+            panic!("{name}: no frames")
+        };
+        let way = (last.x_m - first.x_m).hypot(last.y_m - first.y_m);
+        let found = way / take.duration_s();
+        println!("{name}: {found:.3} m/s");
+        assert!(
+            !((found / speed - 1.0).abs() > 0.02),
+            "{name}: {found:.3} m/s, listed {speed}"
+        );
+        // Ahead is where it looks: the way lies forwards in the first heading.
+        let ahead = first.to_local(Point3::new(last.x_m, last.y_m, 0.0)).x;
+        assert!(
+            !(speed > 0.5) || ahead > 0.9 * way,
+            "{name}: {ahead:.2} of {way:.2} m ahead"
+        );
+        if high > 0.0 {
+            let z = take.poses.iter().map(|p| p[2]);
+            let (l, h) = z.fold((f64::MAX, f64::MIN), |(l, h), z| (l.min(z), h.max(z)));
+            assert!(
+                (l - low).abs() < 0.01 && (h - high).abs() < 0.01,
+                "{name}: root {l:.3} to {h:.3} m, listed {low} to {high}"
+            );
+        }
+    }
+}
+
+#[test]
+fn feet_stand_on_the_ground_whatever_format_they_come_from() {
+    let Some(data) = shared_data("human_cmu").and_then(|p| Some(p.parent()?.to_owned())) else {
+        return;
+    };
+    // File, a foot's joint, how high it may be when it stands (m): joints lie above the sole.
+    for (name, foot, least, most) in [
+        ("human_cmu/02_01.amc", "ltoes", -0.02, 0.05),
+        (
+            "human_bvh/dataset-2_walk_normal_001.bvh",
+            "Toes_L",
+            -0.02,
+            0.05,
+        ),
+        ("human_joint/humanoid3d_walk.txt", "left_ankle", 0.03, 0.12),
+        ("quadruped/dog3d/dog3d_trot.txt", "left_finger", -0.03, 0.08),
+    ] {
+        let take = open(&data.join(name), &ImportOptions::default())
+            .expect(name)
+            .takes
+            .remove(0);
+        let joint = skeleton(&take).joint(foot).expect("a foot");
+        let low = (0..take.len())
+            .map(|k| places(&take, k)[joint].z)
+            .fold(f64::MAX, f64::min);
+        println!("{name}: {foot} down to {low:.3} m");
+        assert!(
+            (least..most).contains(&low),
+            "{name}: {foot} down to {low:.3} m"
+        );
+    }
+}
+
+#[test]
+fn laikago_s_joints_are_those_of_its_urdf_and_its_feet_reach_the_ground() {
+    let Some(data) = shared_data("quadruped").and_then(|p| Some(p.parent()?.to_owned())) else {
+        return;
+    };
+    for (motion, urdf, radius) in [
+        (
+            "quadruped/laikago/dog_trot.txt",
+            "robots/laikago/laikago.urdf",
+            0.0265,
+        ),
+        (
+            "quadruped/laikago/inplace_steps.txt",
+            "robots/laikago/laikago.urdf",
+            0.0265,
+        ),
+        ("quadruped/a1/trot0.txt", "robots/a1/a1.urdf", 0.02),
+    ] {
+        let text = std::fs::read_to_string(data.join(urdf)).expect("a URDF");
+        let model = RobotModel::from_urdf(&text).expect("a URDF");
+        let take = open(&data.join(motion), &ImportOptions::default())
+            .expect(motion)
+            .takes
+            .remove(0);
+        let TakeBody::Floating(names) = &take.body else {
+            panic!("{motion}: no walking robot")
+        };
+        let order: Vec<usize> = (model.joint_names().iter())
+            .map(|j| {
+                names
+                    .iter()
+                    .position(|n| n == j)
+                    .expect("the URDF's joints")
+            })
+            .collect();
+        let feet: Vec<usize> = (["FR_foot", "FL_foot", "RR_foot", "RL_foot"].iter())
+            .map(|f| model.link(f).expect("a foot"))
+            .collect();
+        let mut lowest = [f64::MAX; 4];
+        for pose in &take.poses {
+            let q: Vec<f64> = order.iter().map(|i| pose[*i]).collect();
+            let body = Isometry3::from_parts(
+                nalgebra::Translation3::new(0.0, 0.0, pose[14]),
+                nalgebra::UnitQuaternion::from_euler_angles(pose[15], pose[16], 0.0),
+            );
+            for (low, foot) in lowest.iter_mut().zip(&feet) {
+                let z = (body * model.link_pose(*foot, &q)).translation.z;
+                *low = low.min(z - radius);
+            }
+        }
+        println!("{motion}: soles down to {lowest:.3?} m");
+        assert!(
+            lowest.iter().all(|z| z.abs() < 0.06),
+            "{motion}: soles down to {lowest:.3?} m"
+        );
+    }
+}
+
+#[test]
+fn tables_come_back_to_the_digit() {
+    let walk = parse_gltf(&fox(), &centimetres()).takes.remove(1);
+    let folder = tempfile::tempdir().expect("a folder");
+    let bones = folder.path().join("walk.bvh");
+    std::fs::write(&bones, to_bvh(&walk).expect("a skeleton")).expect("written");
+    let clip = folder.path().join("walk.json");
+    let file = walk.to_clip(handwave::motion::clip::ClipKind::Cycle, 42);
+    std::fs::write(&clip, file.to_json()).expect("written");
+    let options = ImportOptions {
+        skeleton: Some(clip),
+        ..ImportOptions::default()
+    };
+    let text = to_csv(&walk).expect("frames");
+    let again = through_file("walk.csv", text.as_bytes(), &options);
+    let off = apart(&walk, &again);
+    assert!(off < 1e-6, "{off} m off");
+    // Digits may differ where a rotation vector nears a half turn, by as much as rounding does.
+    let rows = |text: &str| -> Vec<f64> {
+        let cells = text.lines().skip(1).flat_map(|l| l.split(','));
+        cells.map(|c| c.parse().expect("a number")).collect()
+    };
+    let (a, b) = (rows(&text), rows(&to_csv(&again).expect("frames")));
+    let off = a
+        .iter()
+        .zip(&b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(a.len() == b.len() && off < 3e-9, "{off} between tables");
+
+    let table = "t,hip,knee,x,y,z,roll,pitch,yaw\n0.0,0.1,-0.2,0,0,0.3,0,0.01,0.02\n0.1,0.2,-0.3,0.1,0,0.3,0,0,0.1\n";
+    let robot = through_file("robot.csv", table.as_bytes(), &ImportOptions::default());
+    assert!(
+        matches!(&robot.body, TakeBody::Floating(n) if n.len() == 2),
+        "{:?}",
+        robot.body
+    );
+    let written = to_csv(&robot).expect("frames");
+    let again = through_file("robot.csv", written.as_bytes(), &ImportOptions::default());
+    assert_eq!(written, to_csv(&again).expect("frames"));
+}
+
+#[test]
+fn uneven_times_become_even_ones() {
+    let table = "t,hip\n0.0,0.0\n0.1,0.1\n0.2,0.2\n0.5,0.5\n0.6,0.6\n";
+    let take = through_file("uneven.csv", table.as_bytes(), &ImportOptions::default());
+    assert_eq!(take.len(), 7, "a frame every 0.1 s");
+    let off = (take.poses.iter().enumerate())
+        .map(|(k, p)| (p[0] - 0.1 * k as f64).abs())
+        .fold(0.0, f64::max);
+    assert!(off < 1e-9, "{off} rad off a straight line");
+}
+
+#[test]
+fn the_fox_comes_back_from_gltf_with_its_skin() {
+    let file = parse_gltf(&fox(), &centimetres());
+    let walk = &file.takes[1];
+    let scene = skeleton_to_gltf(walk, file.skin.as_ref()).expect("a skeleton");
+    for (name, bytes) in [
+        ("a.glb", scene.to_glb()),
+        ("a.gltf", scene.to_json().into_bytes()),
+    ] {
+        let again = GltfFile::parse(&bytes, name, None, &ImportOptions::default())
+            .expect("valid by the reader's checks");
+        assert_eq!(again.takes.len(), 1);
+        let take = &again.takes[0];
+        let (mut turn, at) = (0.0_f64, apart(walk, take));
+        for (a, b) in walk.poses.iter().zip(&take.poses) {
+            for (i, joint) in file.skeleton.joints.iter().enumerate() {
+                let j = again.skeleton.joint(&joint.name).expect("the same joints");
+                turn = turn.max(Skeleton::rotation(a, i).angle_to(&Skeleton::rotation(b, j)));
+            }
+        }
+        println!("{name}: {turn:.1e} rad, {at:.1e} m");
+        assert!(turn < 1e-4 && at < 1e-5, "{name}: {turn} rad, {at} m off");
+        let off = off_reference(&again);
+        assert!(off < 1e-6, "{name}: the skin is {off} m off as bound");
+        let skins = [file.skin.as_ref(), again.skin.as_ref()].map(|s| s.expect("a skin"));
+        let apart = (skins[0].positions().iter().zip(skins[1].positions()))
+            .map(|(a, b)| (a - b).norm())
+            .fold(0.0, f64::max);
+        assert!(apart < 1e-6, "{name}: vertices {apart} m off");
+    }
+}
+
+#[test]
+fn a_robot_in_gltf_has_its_links_where_its_kinematics_puts_them() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let urdf = std::fs::read_to_string(root.join("configs/robots/pup.urdf")).expect("a URDF");
+    let model = RobotModel::from_urdf(&urdf).expect("a URDF");
+    let names = model.joint_names();
+    let poses: Vec<Vec<f64>> = (0..20)
+        .map(|k| {
+            let angle = |j: usize| 0.4 * (0.5 * k as f64 + j as f64).sin();
+            let mut pose: Vec<f64> = (0..names.len()).map(angle).collect();
+            pose.extend([0.0, 0.0, 0.15, 0.05, -0.1, 0.0]);
+            pose
+        })
+        .collect();
+    let roots = (0..20).map(|k| handwave::body::RootPose {
+        x_m: 0.02 * f64::from(k),
+        y_m: 0.01 * f64::from(k),
+        yaw_rad: 0.05 * f64::from(k),
+    });
+    let take = Take {
+        name: "waves".into(),
+        origin: "made up".into(),
+        dt_s: 1.0 / 60.0,
+        body: TakeBody::Floating(names),
+        roots: roots.collect(),
+        poses,
+        wraps: false,
+    };
+    let bytes = robot_to_gltf(&take, &model).expect("its robot").to_glb();
+    let forward = ImportOptions {
+        forward: Some("z".parse().expect("an axis")),
+        ..ImportOptions::default()
+    };
+    let file = GltfFile::parse(&bytes, "robot", None, &forward).expect("valid");
+    let again = &file.takes[0];
+    let mut worst = 0.0_f64;
+    for (k, pose) in take.poses.iter().enumerate() {
+        let at = places(again, k);
+        let body = nalgebra::UnitQuaternion::from_euler_angles(0.05, -0.1, 0.0);
+        for (link, name) in model.links.iter().enumerate() {
+            let joint = file.skeleton.joint(name).expect("the link");
+            let local = body * Point3::from(model.link_pose(link, pose).translation.vector);
+            let place = take.roots[k].to_world(Point3::new(local.x, local.y, local.z + 0.15));
+            worst = worst.max((at[joint] - place).norm());
+        }
+    }
+    assert!(worst < 1e-5, "a link is {worst} m off");
+}
+
+const TINY_ASF: &str = "# a leg
+:version 1.10
+:units
+  mass 1.0
+  length 0.45
+  angle deg
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+  begin
+    id 1
+    name lfemur
+    direction 0 -1 0
+    length 8
+    axis 0 0 20 XYZ
+    dof rx ry rz
+    limits (-160.0 20.0)
+           (-70.0 70.0)
+           (-60.0 70.0)
+  end
+  begin
+    id 2
+    name ltibia
+    direction 0 -1 0
+    length 7
+    axis 0 0 0 XYZ
+    dof rx
+    limits (-10.0 170.0)
+  end
+:hierarchy
+  begin
+    root lfemur
+    lfemur ltibia
+  end
+";
+
+const TINY_AMC: &str = "#!OML:ASF leg.asf
+:FULLY-SPECIFIED
+:DEGREES
+1
+root 0 15 0 0 0 0
+lfemur 0 0 0
+ltibia 90
+2
+root 0 15 2 0 90 0
+lfemur 0 0 0
+ltibia 0
+";
+
+/// Writes skeleton and motion side by side and reads the motion.
+fn leg(asf: &str, amc: &str) -> Result<Take, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("leg.asf"), asf).expect("written");
+    let path = folder.path().join("leg_01.amc");
+    std::fs::write(&path, amc).expect("written");
+    let imported = open(&path, &ImportOptions::default()).map_err(|e| e.to_string())?;
+    Ok(imported.takes[0].clone())
+}
+
+#[test]
+fn a_leg_of_an_asf_bends_about_its_bone_s_axes() {
+    let take = leg(TINY_ASF, TINY_AMC).expect("good");
+    let unit = 0.0254 / 0.45;
+    // The shin turned by 90 degrees about x of the file: its end goes from down to backwards (-z),
+    // which is -x of ours. The root is 15 units up, the knee 8 below it.
+    let at = places(&take, 0);
+    let tip = at[skeleton(&take).joint("ltibia_end").expect("a tip")];
+    let off = (tip - Point3::new(-7.0 * unit, 0.0, 7.0 * unit)).norm();
+    assert!(off < 1e-9, "the tip is at {tip:?}, {off} m off");
+    let turned = take.roots[1].yaw_rad.to_degrees();
+    assert!((turned - 90.0).abs() < 1e-9 && (take.roots[1].x_m - 2.0 * unit).abs() < 1e-12);
+}
+
+#[test]
+fn faults_of_files_name_the_place_what_was_found_and_what_is_allowed() {
+    let none = ImportOptions::default();
+    let bvh = TINY_BVH.replace("10 -5 0 0 30 0", "10 -5 0 0 x 0");
+    let json = |frames: &str| {
+        format!("{{\"LoopMode\": \"Wrap\", \"FrameDuration\": 0.02, \"Frames\": [{frames}]}}")
+    };
+    let level = "0, 0, 0.3, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1";
+    let long = json(&format!("[{level}], [{level}, 4]"));
+    let short = json("[0, 0, 0.3]");
+    let zero = json(&format!(
+        "[{}]",
+        level.replacen("0, 0, 0, 1,", "0, 0, 0, 0,", 1)
+    ));
+    let cases: [(&str, &str, &str); 13] = [
+        ("a.bvh", &bvh, "line 33: found `x` in frame 1"),
+        ("a.csv", "", "header `t,<joint>"),
+        ("a.csv", "t,a,a\n0,1,2\n", "column 3 called \"a\""),
+        (
+            "a.csv",
+            "t,a\n0,1\n0.1,nan\n",
+            "line 3: found \"nan\"; allowed: a number for a",
+        ),
+        ("a.csv", "t,a\n0,1\n0,1\n", "line 3: found t 0 after 0"),
+        ("a.csv", "t,a\n0,1,2\n", "line 2: found 3 cells"),
+        ("a.csv", "t,a.rx,a.ry,a.rz\n0,1,2,3\n", "--skeleton FILE"),
+        ("a.json", &long, "frame 1: found 20 numbers"),
+        ("a.json", &short, "3 numbers each, with FrameDuration"),
+        ("a.json", &zero, "frame 0: found a quaternion of length 0"),
+        (
+            "a.txt",
+            "{\"Frames\": [[\"a\"]]}",
+            "not the JSON of a motion",
+        ),
+        ("a.xyz", "what is this", "no known extension"),
+        (
+            "a.gltf",
+            "{\"asset\": {\"version\": \"2.0\"}, \"nodes\": []}",
+            "no skin and no animated node",
+        ),
+    ];
+    for (name, text, expected) in cases {
+        let found = message(name, text.as_bytes(), &none);
+        assert!(
+            found.contains(expected),
+            "{name}: {found}\nwithout: {expected}"
+        );
+    }
+    for (asf, amc, expected) in [
+        (
+            TINY_ASF.replace("dof rx ry rz", "dof rx rq"),
+            TINY_AMC.into(),
+            "line 19: found \"rq\"",
+        ),
+        (
+            TINY_ASF.replace("lfemur ltibia", "lfemur tibia"),
+            TINY_AMC.into(),
+            "bone \"tibia\"",
+        ),
+        (
+            TINY_ASF.replace("    lfemur ltibia\n", ""),
+            TINY_AMC.into(),
+            "bone ltibia that hangs on nothing",
+        ),
+        (
+            TINY_ASF.into(),
+            TINY_AMC.replace("ltibia 90", "ltibia 90 1"),
+            "line 7: found 2 numbers for ltibia",
+        ),
+        (
+            TINY_ASF.into(),
+            TINY_AMC.replace("ltibia 90\n", ""),
+            "line 4: found frame 1 without bone ltibia",
+        ),
+        (
+            TINY_ASF.into(),
+            TINY_AMC.replace("ltibia 0", "rtibia 0"),
+            "line 11: found bone \"rtibia\"",
+        ),
+    ] {
+        let found = leg(&asf, &amc).expect_err(expected);
+        assert!(found.contains(expected), "{found}\nwithout: {expected}");
+    }
+    let glb = std::fs::read(fox()).expect("the fox");
+    let cut = message("fox.glb", &glb[..90_000], &none);
+    assert!(
+        cut.contains("BIN chunk: found the end of the file"),
+        "{cut}"
+    );
+    let sideways = ImportOptions {
+        up: Some("z".parse().expect("an axis")),
+        forward: Some("-z".parse().expect("an axis")),
+        ..centimetres()
+    };
+    let found = message("a.bvh", TINY_BVH.as_bytes(), &sideways);
+    assert!(found.contains("two different axes"), "{found}");
+}
+
+/// A text or binary with some bytes cut, changed or doubled.
+fn spoiled(good: &[u8], edits: &[(u32, u8, u8)]) -> Vec<u8> {
+    let mut bytes = good.to_vec();
+    for (at, kind, value) in edits {
+        if bytes.is_empty() {
+            break;
+        }
+        let at = *at as usize % bytes.len();
+        match kind % 5 {
+            0 => bytes.truncate(at),
+            1 => bytes[at] = *value,
+            2 => bytes.insert(at, b"0-.{}[],eE\n \"9"[usize::from(*value) % 14]),
+            3 => {
+                let end = (at + usize::from(*value)).min(bytes.len());
+                bytes.drain(at..end);
+            }
+            _ => {
+                let end = (at + usize::from(*value)).min(bytes.len());
+                let copy = bytes[at..end].to_vec();
+                bytes.splice(at..at, copy);
+            }
+        }
+    }
+    bytes
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig {
+        failure_persistence: None,
+        ..Default::default()
+    })]
+
+    #[test]
+    fn no_spoiled_file_makes_the_reader_panic(
+        edits in proptest::collection::vec(proptest::prelude::any::<(u32, u8, u8)>(), 1..6),
+    ) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let read = |name: &str, bytes: &[u8], options: &ImportOptions| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).expect("written");
+            if let Ok(imported) = open(&path, options) {
+                for take in &imported.takes {
+                    assert!(take.poses.iter().flatten().all(|v| v.is_finite()), "{name}");
+                    let _ = (to_bvh(take), to_csv(take));
+                }
+            }
+        };
+        let none = ImportOptions::default();
+        let humanoid = format!(
+            "{{\"Loop\": \"wrap\", \"Frames\": [[0.1, {}], [0, {}]]}}",
+            "1, ".repeat(42) + "1", "0.5, ".repeat(42) + "1"
+        );
+        let walk = "t,x,y,z,Hips.rx,Hips.ry,Hips.rz\n0,0,0,1,0,0,0\n0.1,0.1,0,1,0,0,1\n0.4,0.1,0,1,0,0,1\n";
+        read("a.bvh", &spoiled(TINY_BVH.as_bytes(), &edits), &none);
+        std::fs::write(folder.path().join("leg.asf"), TINY_ASF).expect("written");
+        read("leg.amc", &spoiled(TINY_AMC.as_bytes(), &edits), &none);
+        std::fs::write(folder.path().join("leg.asf"), spoiled(TINY_ASF.as_bytes(), &edits)).expect("written");
+        read("leg.amc", TINY_AMC.as_bytes(), &none);
+        read("a.json", &spoiled(humanoid.as_bytes(), &edits), &none);
+        std::fs::write(folder.path().join("bones.bvh"), TINY_BVH).expect("written");
+        let bones = ImportOptions { skeleton: Some(folder.path().join("bones.bvh")), ..none.clone() };
+        read("a.csv", &spoiled(walk.as_bytes(), &edits), &bones);
+    }
+
+    #[test]
+    fn no_spoiled_gltf_makes_the_reader_panic(
+        edits in proptest::collection::vec(proptest::prelude::any::<(u32, u8, u8)>(), 1..4),
+        text in proptest::prelude::any::<bool>(),
+    ) {
+        static SMALL: std::sync::OnceLock<(Vec<u8>, Vec<u8>)> = std::sync::OnceLock::new();
+        let (binary, json) = SMALL.get_or_init(|| {
+            let take = through_file("tiny.bvh", TINY_BVH.as_bytes(), &centimetres());
+            let scene = skeleton_to_gltf(&take, None).expect("a skeleton");
+            (scene.to_glb(), scene.to_json().into_bytes())
+        });
+        let bytes = spoiled(if text { json } else { binary }, &edits);
+        let _ = GltfFile::parse(&bytes, "spoiled", None, &ImportOptions::default());
+    }
 }

@@ -8,6 +8,7 @@ pub mod analysis;
 pub mod animator;
 pub mod class;
 pub mod clip;
+pub mod export;
 pub mod gait;
 pub mod gait_frames;
 pub mod graph;

@@ -118,6 +118,24 @@ impl Take {
         }
     }
 
+    /// The joint whose rotation (rad) or position differs most between the first and the last frame.
+    pub fn gap(&self) -> Option<(String, f64)> {
+        let (first, last) = (self.poses.first()?, self.poses.last()?);
+        let gaps: Vec<(&String, f64)> = match &self.body {
+            TakeBody::Joints(names) | TakeBody::Floating(names) => (names.iter().enumerate())
+                .map(|(i, name)| (name, (first[i] - last[i]).abs()))
+                .collect(),
+            TakeBody::Skeleton(skeleton) => (skeleton.joints.iter().enumerate())
+                .map(|(i, joint)| {
+                    let turn = |pose: &[f64]| Skeleton::rotation(pose, i);
+                    (&joint.name, turn(first).angle_to(&turn(last)))
+                })
+                .collect(),
+        };
+        let most = gaps.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        most.map(|(name, gap)| (name.clone(), gap))
+    }
+
     /// The take as a clip of `frames` frames.
     ///
     /// A cycle lasts from the first frame to the last, which is taken for the first one a cycle later

@@ -14,6 +14,9 @@ use std::sync::Arc;
 /// CMU's rate; the files do not tell.
 const DEFAULT_RATE_HZ: f64 = 120.0;
 
+/// Angles may leave the limits by this much without a word, degrees.
+const LIMIT_SLACK_DEG: f64 = 1.0;
+
 /// The skeleton of a motion file: as told, else of the same name, else of the name before the last `_`,
 /// else the only one in the folder.
 pub(super) fn skeleton_beside(
@@ -59,8 +62,14 @@ pub(super) fn parse(
     options: &ImportOptions,
 ) -> Result<Imported, ImportFault> {
     let (joints, bones) = skeleton.joints();
-    let frames = frames(text, skeleton, &bones)?;
+    let (frames, beyond) = frames(text, skeleton, &bones)?;
     let mut warnings = Vec::new();
+    if beyond > 0 {
+        warnings.push(format!(
+            "{beyond} angles in {} frames lie over {LIMIT_SLACK_DEG} degree outside of the limits of their bones, as is usual in CMU's data; nothing was changed",
+            frames.len()
+        ));
+    }
     if options.rate_hz.is_none() {
         warnings.push(format!(
             "taken for {DEFAULT_RATE_HZ} frames a second, CMU's rate; --fps says otherwise"
@@ -90,7 +99,8 @@ fn frames(
     text: &str,
     skeleton: &Asf,
     bones: &[Option<usize>],
-) -> Result<Vec<RawFrame>, ImportFault> {
+) -> Result<(Vec<RawFrame>, usize), ImportFault> {
+    let mut beyond = 0;
     let mut degrees = skeleton.degrees;
     let mut frames: Vec<RawFrame> = Vec::new();
     let mut seen: Vec<bool> = Vec::new();
@@ -163,6 +173,7 @@ fn frames(
             )
             .into());
         }
+        beyond += bone.beyond_limits(&numbers, degrees);
         let (moved, turn) = bone.motion(&numbers, degrees);
         if b == 0 {
             frame.place = skeleton.position + moved;
@@ -173,10 +184,25 @@ fn frames(
     }
     check_size(frames.len(), bones.len())?;
     complete(&seen, started, frames.len())?;
-    Ok(frames)
+    Ok((frames, beyond))
 }
 
 impl Bone {
+    /// How many numbers lie well outside of the bone's limits, which are in the skeleton's unit of angles.
+    fn beyond_limits(&self, numbers: &[f64], degrees: bool) -> usize {
+        let slack = if degrees {
+            LIMIT_SLACK_DEG
+        } else {
+            LIMIT_SLACK_DEG.to_radians()
+        };
+        let outside = |(v, (low, high)): (&f64, &(f64, f64))| *v < low - slack || *v > high + slack;
+        numbers
+            .iter()
+            .zip(&self.limits)
+            .filter(|p| outside(*p))
+            .count()
+    }
+
     /// Translation and rotation of the bone's joint by the numbers of a frame: `C M C^-1`, the first
     /// angle turned first.
     fn motion(&self, numbers: &[f64], degrees: bool) -> (Vector3<f64>, UnitQuaternion<f64>) {

@@ -72,7 +72,9 @@ fn raw(file: &BvhFile, name: &str, warnings: &mut Vec<String>) -> Raw {
     // Parents come first in the file, so that all below the root follow it.
     let mut kept = vec![root];
     for (i, joint) in file.joints.iter().enumerate().skip(root + 1) {
-        if joint.parent.is_some_and(|p| kept.contains(&p)) {
+        // An End Site of no length is there for the format's sake.
+        let is_empty = joint.is_end && joint.offset == [0.0; 3];
+        if !is_empty && joint.parent.is_some_and(|p| kept.contains(&p)) {
             kept.push(i);
         }
     }

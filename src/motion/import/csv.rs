@@ -42,7 +42,7 @@ pub(super) fn parse(
 ) -> Result<Imported, ImportFault> {
     let table = Table::parse(text)?;
     let grid = Grid::of(&table.times, options.rate_hz);
-    check_size(grid.frames, table.names.len())?;
+    grid.check(&table.times, table.names.len())?;
     let mut warnings = Vec::new();
     if grid.uneven {
         warnings.push(format!(

@@ -58,6 +58,7 @@ impl GltfFile {
     ) -> Result<Self, ImportFault> {
         let (json, binary) = buffers::split(bytes)?;
         let document = gltf::Gltf::from_slice(json)?.document;
+        check_channels(&document)?;
         let buffers = Buffers::load(&document, binary, folder)?;
         let nodes = Nodes::read(&document)?;
         let animations = document
@@ -115,6 +116,35 @@ impl GltfFile {
             warnings,
         })
     }
+}
+
+/// Checks what the parser does not: the targets of animation channels.
+fn check_channels(document: &gltf::Document) -> Result<(), ImportFault> {
+    let root = document.as_json();
+    for (a, animation) in root.animations.iter().enumerate() {
+        for (c, channel) in animation.channels.iter().enumerate() {
+            let place = || format!("animation {a}, channel {c}");
+            let node = channel.target.node.value();
+            if node >= root.nodes.len() {
+                return Err(ImportFault::element(
+                    place(),
+                    format!("node {node}"),
+                    format!("one of the {} nodes", root.nodes.len()),
+                ));
+            }
+            if matches!(
+                channel.target.path,
+                gltf::json::validation::Checked::Invalid
+            ) {
+                return Err(ImportFault::element(
+                    place(),
+                    "an unknown path",
+                    "translation, rotation, scale or weights",
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The animations to read.

@@ -114,11 +114,11 @@ pub(super) fn parse(
 fn rotation(q: [f64; 4], place: &str) -> Result<UnitQuaternion<f64>, ImportFault> {
     let [x, y, z, w] = q;
     let q = Quaternion::new(w, x, y, z);
-    if !((q.norm() - 1.0).abs() < 0.1) {
+    if !((q.norm() - 1.0).abs() < 0.5) {
         return Err(ImportFault::element(
             place,
             format!("a quaternion of length {:.3}", q.norm()),
-            "unit quaternions",
+            "unit quaternions; 0.5 to 1.5 is scaled",
         ));
     }
     Ok(UnitQuaternion::new_normalize(q))
@@ -170,7 +170,7 @@ fn skeleton(
     if grid.uneven {
         warnings.push(format!("resampled evenly to {} frames", grid.frames));
     }
-    check_size(grid.frames, rows.len())?;
+    grid.check(&times, rows.len())?;
     let frames = uneven::frames(&times, &frames, &grid);
     let raw = Raw {
         name: name.to_owned(),

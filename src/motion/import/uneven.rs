@@ -1,5 +1,7 @@
 //! Frames at uneven times brought to even ones.
 
+use super::check_size;
+use super::error::ImportFault;
 use super::raw::RawFrame;
 
 /// Times this far from even, as a share of the step, are even but for rounding in the file.
@@ -55,6 +57,23 @@ impl Grid {
             frames: intervals.saturating_add(1),
             uneven: true,
         }
+    }
+
+    /// Refuses to make up far more frames than the file has: a gap of hours in a motion is a fault.
+    pub fn check(&self, times: &[f64], columns: usize) -> Result<(), ImportFault> {
+        let most = 1000 + 100 * times.len();
+        if self.uneven && self.frames > most {
+            return Err(ImportFault::element(
+                "the times",
+                format!(
+                    "{} frames from which {} at an even rate would be made",
+                    times.len(),
+                    self.frames
+                ),
+                format!("at most {most}; is there a gap, or a time in another unit?"),
+            ));
+        }
+        check_size(self.frames, columns)
     }
 
     /// For frame `k` of the grid: the frame before it in `times`, and how far it is to the next, 0..1.
