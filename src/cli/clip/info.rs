@@ -2,13 +2,13 @@
 
 mod plots;
 
+use super::source::SourceArgs;
 use crate::base::print::{say, warn};
 use crate::cli::{ExitStatus, Failure};
 use crate::motion::analysis::cut::{self, CutOptions, Seam};
 use crate::motion::analysis::mirror::{self, Mirror, Symmetry};
 use crate::motion::analysis::{Analysis, BodyModel, FootContact, analyse};
 use crate::motion::clip::ClipFile;
-use crate::motion::import::{ImportOptions, open};
 use crate::motion::take::{Take, TakeBody};
 use crate::robot::RobotModel;
 use clap::Args;
@@ -29,15 +29,14 @@ pub struct InfoArgs {
     /// Draw contacts, foot heights, joints and speed as SVG
     #[arg(long, value_name = "OUT.svg")]
     plot: Option<PathBuf>,
-    /// Frames per second, where the file does not tell them
-    #[arg(long)]
-    rate: Option<f64>,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 /// Examples for the help.
 pub const EXAMPLES: &str = "Examples:
   handwave clip info walk.bvh
-  handwave clip info Fox.glb#Walk --plot walk.svg
+  handwave clip info Fox.glb#Walk --unit cm --plot walk.svg
   handwave clip info trot0.txt --urdf a1.urdf --json
 
 Feet stand where they are low and slow. Touch-down is a fraction of the cycle; in the
@@ -59,42 +58,25 @@ struct Findings {
 /// Runs `handwave clip info ...`.
 pub fn run(args: &InfoArgs) -> Result<ExitStatus, Failure> {
     let model = args.urdf.as_deref().map(read_model).transpose()?;
-    let options = ImportOptions {
-        rate_hz: args.rate,
-        ..ImportOptions::default()
-    };
-    let imported = open(&args.file, &options).map_err(|e| Failure::input(e.to_string()))?;
+    let take = args.source.read(&args.file)?;
     // A clip of our own says more than its take: kind, limbs, root.
     let clip = std::fs::read_to_string(&args.file)
         .ok()
         .and_then(|text| ClipFile::from_json(&text).ok());
-    let mut all = Vec::new();
-    for take in imported.takes {
-        let findings = look(take, clip.clone(), model.as_ref())
-            .map_err(|e| Failure::input(format!("{}: {e}", args.file.display())))?;
-        all.push(findings);
-    }
+    let findings = look(take, clip, model.as_ref())
+        .map_err(|e| Failure::input(format!("{}: {e}", args.file.display())))?;
     if args.json {
-        let takes: Vec<Value> = all.iter().map(to_json).collect();
-        let mut summary = match takes.as_slice() {
-            [one] => one.clone(),
-            _ => json!({ "takes": takes }),
-        };
-        summary["import_warnings"] = json!(imported.warnings);
-        say(format_args!("{summary}"));
+        say(format_args!("{}", to_json(&findings)));
     } else {
-        for (i, findings) in all.iter().enumerate() {
-            if i > 0 {
-                say(format_args!(""));
-            }
-            print(findings);
-        }
-        for warning in &imported.warnings {
-            say(format_args!("note: {warning}"));
-        }
+        print(&findings);
     }
     if let Some(out) = &args.plot {
-        plot(&all, out)?;
+        let text = plots::figure(&findings)
+            .svg()
+            .map_err(|e| Failure::input(e.to_string()))?;
+        std::fs::write(out, text)
+            .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
+        warn(format_args!("wrote {}", out.display()));
     }
     Ok(ExitStatus::Done)
 }
@@ -103,23 +85,6 @@ fn read_model(path: &Path) -> Result<RobotModel, Failure> {
     let text = std::fs::read_to_string(path)
         .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
     RobotModel::from_urdf(&text).map_err(|e| Failure::input(format!("{}: {e}", path.display())))
-}
-
-fn plot(all: &[Findings], out: &PathBuf) -> Result<(), Failure> {
-    let [one] = all else {
-        let names: Vec<&str> = all.iter().map(|f| f.take.name.as_str()).collect();
-        return Err(Failure::input(format!(
-            "--plot draws one motion; choose with FILE#NAME: {}",
-            names.join(", ")
-        )));
-    };
-    let text = plots::figure(one)
-        .svg()
-        .map_err(|e| Failure::input(e.to_string()))?;
-    std::fs::write(out, text)
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
-    warn(format_args!("wrote {}", out.display()));
-    Ok(())
 }
 
 fn look(
@@ -168,6 +133,14 @@ fn look(
                 ));
             }
         }
+    }
+    if let Some(feet) = body.feet()
+        && let Some(reach) = (0..feet.count()).map(|f| feet.reach_m(f)).reduce(f64::max)
+        && !(0.02..=5.0).contains(&reach)
+    {
+        warnings.push(format!(
+            "legs reach {reach:.3} m: is the unit of length right? (--unit)"
+        ));
     }
     for foot in &found.feet {
         if foot.error.penetration_m > 0.02 {

@@ -44,7 +44,7 @@ pub struct FootContact {
 
 /// Height above the ground below which a foot may stand, and above which it does not any more, as shares
 /// of the leg's reach.
-const HEIGHT: (f64, f64) = (0.045, 0.07);
+const HEIGHT: (f64, f64) = (0.06, 0.09);
 /// Speed below which it may stand and above which it does not, as shares of its speed in swing ...
 const SPEED: (f64, f64) = (0.25, 0.40);
 /// ... but not below these many reaches per second: a foot that trembles stands.
@@ -53,6 +53,8 @@ const TREMBLE_PER_S: (f64, f64) = (0.25, 0.4);
 const SHORTEST_S: f64 = 0.04;
 /// The ground's height is that of the lowest of all frames but this share.
 const OUTLIERS: f64 = 0.04;
+/// Feet that stand are at most this share of the leg's reach above the lowest.
+const LOW_PART: f64 = 0.1;
 /// A foot in swing is faster than this share of all frames.
 const SWING: f64 = 0.85;
 
@@ -94,9 +96,10 @@ pub fn find(
             let world: Vec<Point3<f64>> = (local.iter().zip(&roots))
                 .map(|(p, root)| root.to_world(*p))
                 .collect();
-            let speeds = speeds(&world, &roots, take.dt_s, closed);
+            let speeds = speeds(&world, take.dt_s, closed);
             let reach = feet.reach_m(f);
-            let mut contact = hysteresis(&world, &speeds, ground[f], reach, closed);
+            let ground = standing_height(&world, &speeds, ground[f], reach);
+            let mut contact = hysteresis(&world, &speeds, ground, reach, closed);
             let shortest = (SHORTEST_S / take.dt_s).round().max(1.0) as usize;
             // The last frame of a loop is its first one.
             let period = if closed { n - 1 } else { n };
@@ -108,13 +111,13 @@ pub fn find(
             let counted = |k: usize| (world[k], contact[k]);
             FootContact {
                 name: feet.name(f).into(),
-                ground_m: ground[f],
+                ground_m: ground,
                 phase: cycle.and_then(|c| phase(&stances, c, closed)),
                 duty: duty(&contact[..period], cycle),
-                clearance_m: local.iter().map(|p| p.z - ground[f]).fold(0.0, f64::max),
+                clearance_m: local.iter().map(|p| p.z - ground).fold(0.0, f64::max),
                 slide: foot_slide((0..n).map(counted)),
-                error: ground_error((0..n).map(counted), ground[f]),
-                heights_m: local.iter().map(|p| p.z - ground[f]).collect(),
+                error: ground_error((0..n).map(counted), ground),
+                heights_m: local.iter().map(|p| p.z - ground).collect(),
                 contact,
                 stances,
             }
@@ -127,6 +130,28 @@ fn low_end(points: &[Point3<f64>]) -> f64 {
     quantile(points.iter().map(|p| p.z), OUTLIERS)
 }
 
+/// Height of a foot when it stands: the middle of those at which it is slow and low. A floor that is not
+/// level, or a toe that dips when it pushes, makes the lowest height too low.
+fn standing_height(world: &[Point3<f64>], speeds: &[f64], low: f64, reach: f64) -> f64 {
+    let slow = slow_limits(speeds, reach).0;
+    let standing = (world.iter().zip(speeds))
+        .filter(|(p, speed)| **speed < slow && p.z < low + LOW_PART * reach)
+        .map(|(p, _)| p.z);
+    if standing.clone().count() < 3 {
+        return low;
+    }
+    quantile(standing, 0.5)
+}
+
+/// Speeds below which a foot may stand and above which it does not, m/s.
+fn slow_limits(speeds: &[f64], reach: f64) -> (f64, f64) {
+    let swing = quantile(speeds.iter().copied(), SWING);
+    (
+        (SPEED.0 * swing).max(TREMBLE_PER_S.0 * reach),
+        (SPEED.1 * swing).max(TREMBLE_PER_S.1 * reach),
+    )
+}
+
 fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
@@ -137,20 +162,27 @@ fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// Speeds of a foot at every frame, m/s, all directions; across the ends of a closed cycle too.
-fn speeds(world: &[Point3<f64>], roots: &[RootPose], dt_s: f64, closed: bool) -> Vec<f64> {
+/// Speeds of a foot at every frame, m/s, all directions: of the step before or after it, whichever is
+/// slower, so that the first and the last frame of a stance count as standing. Across the ends of a closed
+/// cycle too.
+fn speeds(world: &[Point3<f64>], dt_s: f64, closed: bool) -> Vec<f64> {
     let n = world.len();
+    let step = |k: usize| (world[k + 1] - world[k]).norm() / dt_s;
     (0..n)
         .map(|k| {
-            if closed && (k == 0 || k == n - 1) && n > 2 {
-                // One step before the end, and one after the start; both in the root's own frame.
-                let before =
-                    roots[n - 1].to_local(world[n - 1]) - roots[n - 1].to_local(world[n - 2]);
-                let after = roots[0].to_local(world[1]) - roots[0].to_local(world[0]);
-                return (before + after).norm() / (2.0 * dt_s);
-            }
-            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
-            (world[b] - world[a]).norm() / ((b - a).max(1) as f64 * dt_s)
+            // The last frame of a loop is its first one.
+            let around = closed && n > 2;
+            let before = match k.checked_sub(1) {
+                Some(before) => step(before),
+                None if around => step(n - 2),
+                None => f64::INFINITY,
+            };
+            let after = match k + 1 < n {
+                true => step(k),
+                false if around => step(0),
+                false => f64::INFINITY,
+            };
+            before.min(after)
         })
         .collect()
 }
@@ -202,10 +234,7 @@ fn hysteresis(
     reach: f64,
     closed: bool,
 ) -> Vec<bool> {
-    let swing = quantile(speeds.iter().copied(), SWING);
-    let slow =
-        |limit: fn((f64, f64)) -> f64| (limit(SPEED) * swing).max(limit(TREMBLE_PER_S) * reach);
-    let (on, off) = (slow(|l| l.0), slow(|l| l.1));
+    let (on, off) = slow_limits(speeds, reach);
     let mut contact = vec![false; world.len()];
     let mut stands = false;
     // A closed cycle is run through twice, so that its beginning knows its end.

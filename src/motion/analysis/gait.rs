@@ -55,9 +55,9 @@ pub fn apart(a: f64, b: f64) -> f64 {
     d.min(1.0 - d)
 }
 
-/// Feet that touch down within this share of the cycle do so together: half of the quarter that is
-/// between the feet of an even walk.
-const TOGETHER: f64 = 0.125;
+/// Feet that touch down within this share of the cycle do so together: a little over half of the quarter
+/// that is between the feet of an even walk, since recordings have few frames a cycle.
+const TOGETHER: f64 = 0.14;
 /// Feet that touch down within this share follow each other.
 const NEAR: f64 = 0.28;
 
@@ -103,7 +103,7 @@ pub fn guess(feet: &[FootContact]) -> Option<Gait> {
         Gait::Trot
     } else if all(sides, TOGETHER) {
         Gait::Pace
-    } else if duty < 0.5 && diagonals[0].min(diagonals[1]) < TOGETHER && ends[0].max(ends[1]) < 0.42
+    } else if duty < 0.4 && diagonals[0].min(diagonals[1]) < TOGETHER && ends[0].max(ends[1]) < 0.42
     {
         Gait::Canter
     } else if duty < 0.5 && all(ends, NEAR + 0.07) {
