@@ -284,3 +284,126 @@ impl Take {
         long
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::SkeletonJoint;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    /// A body that walks a circle of one metre at 1 m/s for `seconds`, its arm swinging at 1 Hz.
+    fn circle(seconds: f64, dt_s: f64) -> Take {
+        let joint = |name: &str, parent, z: f64| SkeletonJoint {
+            name: name.into(),
+            parent,
+            offset_m: [0.0, 0.0, z],
+            rest: [0.0, 0.0, 0.0, 1.0],
+        };
+        let joints = vec![joint("hips", None, 0.0), joint("arm", Some(0), 0.5)];
+        let skeleton = Skeleton::new(joints, UnitQuaternion::identity(), 1.0).expect("good");
+        let frames = (seconds / dt_s).round() as usize;
+        let (mut poses, mut roots) = (Vec::new(), Vec::new());
+        for k in 0..=frames {
+            let t = k as f64 * dt_s;
+            let mut pose = skeleton.rest_pose([0.0, 0.0, 0.9]);
+            let swing = (std::f64::consts::TAU * t).sin();
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), swing);
+            Skeleton::set_rotation(&mut pose, 1, &turn);
+            poses.push(pose);
+            roots.push(RootPose {
+                x_m: 2.0 + t.sin(),
+                y_m: -t.cos(),
+                yaw_rad: t,
+            });
+        }
+        Take {
+            name: "circle".into(),
+            origin: "made up".into(),
+            dt_s,
+            body: TakeBody::Skeleton(Arc::new(skeleton)),
+            poses,
+            roots,
+            wraps: true,
+        }
+    }
+
+    fn apart(a: &(Vec<f64>, RootPose), b: &(Vec<f64>, RootPose)) -> f64 {
+        let turn = Skeleton::rotation(&a.0, 1).angle_to(&Skeleton::rotation(&b.0, 1));
+        let place = (a.1.x_m - b.1.x_m).hypot(a.1.y_m - b.1.y_m);
+        turn.max(place).max((a.1.yaw_rad - b.1.yaw_rad).abs())
+    }
+
+    #[test]
+    fn between_frames_a_take_goes_along_arcs() {
+        let (coarse, fine) = (circle(1.0, 0.05), circle(1.0, 0.0125));
+        let off = (0..=80)
+            .map(|k| apart(&coarse.at(k as f64 * 0.0125), &fine.at(k as f64 * 0.0125)))
+            .fold(0.0, f64::max);
+        // The arm's swing is curved between frames: (2 pi)^2 0.05^2 / 8 = 0.0123; the circle is exact.
+        assert!(off < 0.0125, "{off} m or rad off");
+        let mid = coarse.at(0.525).1;
+        let off = (mid.x_m - 2.0 - 0.525_f64.sin()).hypot(mid.y_m + 0.525_f64.cos());
+        assert!(off < 1e-12, "{off} m off the circle");
+    }
+
+    #[test]
+    fn a_cycle_made_a_clip_and_back_is_the_cycle_from_its_own_start() {
+        let take = circle(1.0, 0.02);
+        let clip = take.to_clip(ClipKind::Cycle, 50);
+        assert!((clip.frequency_hz - 1.0).abs() < 1e-12);
+        let (f, l, a) = (clip.root.forward_m, clip.root.left_m, clip.root.yaw_rad);
+        let off = (f - 1.0).abs().max(l.abs()).max((a - 1.0).abs());
+        assert!(
+            off < 1e-9,
+            "travel {f}, {l}, {a}: {off} off an arc of 1 m, 1 rad"
+        );
+        let back = Take::of_clip(&clip);
+        assert_eq!(back.len(), take.len());
+        let start = take.roots[0];
+        for k in 0..take.len() {
+            let mut moved = back.roots[k];
+            moved = {
+                let p = start.to_world(Point3::new(moved.x_m, moved.y_m, 0.0));
+                RootPose {
+                    x_m: p.x,
+                    y_m: p.y,
+                    yaw_rad: moved.yaw_rad + start.yaw_rad,
+                }
+            };
+            let off = apart(
+                &(take.poses[k].clone(), take.roots[k]),
+                &(back.poses[k].clone(), moved),
+            );
+            assert!(off < 1e-9, "frame {k}: {off} off");
+        }
+    }
+
+    #[test]
+    fn a_cycle_repeated_goes_on_where_it_was() {
+        let (once, thrice) = (circle(1.0, 0.02), circle(3.0, 0.02));
+        let long = once.repeated(3.0);
+        assert_eq!(long.len(), thrice.len());
+        let off = (0..long.len())
+            .map(|k| {
+                let frame = |t: &Take| (t.poses[k].clone(), t.roots[k]);
+                apart(&frame(&long), &frame(&thrice))
+            })
+            .fold(0.0, f64::max);
+        assert!(off < 1e-9, "{off} m or rad off three rounds in one");
+    }
+
+    #[test]
+    fn a_part_ends_where_it_is_cut_and_a_path_lasts_as_long() {
+        let part = circle(2.0, 0.02).part(0.33, 1.01, 9);
+        assert!((part.duration_s() - 0.68).abs() < 1e-12 && !part.wraps);
+        let ends = [part.roots[0].yaw_rad, part.roots[8].yaw_rad];
+        assert!(
+            (ends[0] - 0.33).abs() < 1e-9 && (ends[1] - 1.01).abs() < 1e-9,
+            "{ends:?}"
+        );
+        let clip = part.to_clip(ClipKind::Path, 5);
+        assert!(clip.frames.len() == 5 && (clip.duration_s - 0.68).abs() < 1e-12);
+        let gap = part.gap().expect("frames");
+        assert_eq!(gap.0, "arm");
+    }
+}

@@ -3,11 +3,13 @@
 //! [`model`] reads and checks a URDF, [`kinematics`] places its links, [`leg`] finds legs and
 //! solves them, [`envelope`] is the last thing every target passes before it leaves.
 
+pub mod adapt;
 pub mod envelope;
 pub mod kinematics;
 pub mod leg;
 pub mod model;
+pub mod tip;
 
 pub use envelope::{Envelope, JointEnvelope};
-pub use leg::Leg;
+pub use leg::{Facing, Leg};
 pub use model::{JointLimits, ModelError, RobotModel};

@@ -44,9 +44,9 @@ pub struct FootContact {
 
 /// Height above the ground below which a foot may stand, and above which it does not any more, as shares
 /// of the leg's reach.
-const HEIGHT: (f64, f64) = (0.06, 0.09);
+const HEIGHT: (f64, f64) = (0.055, 0.085);
 /// Speed below which it may stand and above which it does not, as shares of its speed in swing ...
-const SPEED: (f64, f64) = (0.25, 0.40);
+const SPEED: (f64, f64) = (0.22, 0.35);
 /// ... but not below these many reaches per second: a foot that trembles stands.
 const TREMBLE_PER_S: (f64, f64) = (0.25, 0.4);
 /// Shortest stance and shortest swing, seconds.
