@@ -4,6 +4,7 @@
 //! of clips indexed by amplitude and frequency, [`graph`] moves between classes, [`animator`] is
 //! the whole: gesture waves in, poses out.
 
+pub mod analysis;
 pub mod animator;
 pub mod class;
 pub mod clip;
@@ -19,6 +20,7 @@ pub mod inertia;
 pub mod layer;
 mod limbs;
 pub mod mapping;
+pub mod metrics;
 pub mod node;
 pub mod pins;
 pub mod range;
