@@ -2,8 +2,12 @@
 
 use super::source::SourceArgs;
 use crate::cli::{ExitStatus, Failure, say, warn};
+use crate::motion::analysis::cut::{self, CutOptions};
+use crate::motion::analysis::cycle::{self, Features};
+use crate::motion::analysis::{BodyModel, Cycle, contact, travel};
 use crate::motion::clip::{ClipFile, ClipKind};
 use crate::motion::take::Take;
+use crate::robot::RobotModel;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -11,6 +15,7 @@ use std::path::PathBuf;
 pub(super) const EXAMPLES: &str = "Examples:
   handwave clip import fox.glb#Walk --unit cm --out fox_walk.json
   handwave clip import walk.bvh --start 1.10 --end 2.17 --kind cycle --out walk.json
+  handwave clip import walk.bvh --cycle auto --out walk.json        one cycle, found and closed
   handwave clip import 02_01.amc --kind path --origin 'CMU 02_01, mocap.cs.cmu.edu' --out walk.json
   handwave clip import humanoid3d_walk.txt --out walk.json          DeepMimic: wraps, so a cycle
   handwave clip import trot0.txt --out trot.json                    A1, Laikago: joints of the URDF
@@ -26,7 +31,8 @@ Formats, told from extension and content:
 
 A clip is in metres and radians, x forward, y left, z up. A motion that says it loops becomes a cycle,
 any other a path, unless --kind tells; --start and --end then mark one cycle, of which the end is the
-start again.";
+start again. --cycle auto finds the cycle. The ends of a cycle are joined: what they differ by is spread
+over it. Legs that are found (of a robot with --urdf) become the segments of a cycle.";
 
 /// A motion and what to make of it.
 #[derive(Args, Debug)]
@@ -45,6 +51,12 @@ pub(super) struct ImportArgs {
     /// What it is: one cycle, or a path from rest to extreme.
     #[arg(long)]
     kind: Option<Kind>,
+    /// Find one cycle, within --start and --end where they are given.
+    #[arg(long, value_name = "auto", conflicts_with = "kind")]
+    cycle: Option<Found>,
+    /// The robot's description, so that its legs are known.
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
     /// Frames of the clip (default: about as many as the file has there).
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
@@ -65,10 +77,16 @@ enum Kind {
     Path,
 }
 
+/// How a cycle is found.
+#[derive(Copy, Clone, Debug, PartialEq, Eq, ValueEnum)]
+enum Found {
+    Auto,
+}
+
 /// Frames a clip may be asked for.
 const MOST_FRAMES: usize = 100_000;
-/// A cycle whose ends differ by more than this does not close, rad.
-const OPEN_RAD: f64 = 0.05;
+/// Ends of a cycle this far apart are joined with a word, as a share of the motion's extent.
+const OPEN: f64 = 0.05;
 
 pub(super) fn run(args: &ImportArgs) -> Result<ExitStatus, Failure> {
     let mut take = args.source.read(&args.file)?;
@@ -89,54 +107,109 @@ pub(super) fn run(args: &ImportArgs) -> Result<ExitStatus, Failure> {
             "--start {start_s} and --end {end_s} must lie in 0 to {whole_s:.3} s, the start first"
         )));
     }
-    let cut = args.start.is_some() || args.end.is_some();
-    let kind = match args.kind {
-        Some(Kind::Cycle) => ClipKind::Cycle,
-        Some(Kind::Path) => ClipKind::Path,
-        None if take.wraps && !cut => ClipKind::Cycle,
-        None => ClipKind::Path,
-    };
-    let intervals = ((end_s - start_s) / take.dt_s).round().max(1.0) as usize;
-    let usual = match kind {
-        ClipKind::Cycle => intervals.max(8),
-        ClipKind::Path => intervals + 1,
-    };
-    let frames = args.frames.unwrap_or(usual.min(MOST_FRAMES));
-    let least = match kind {
-        ClipKind::Cycle => 8,
-        ClipKind::Path => 2,
-    };
-    if !(least..=MOST_FRAMES).contains(&frames) {
-        return Err(bad(format!(
-            "--frames {frames} must lie in {least} to {MOST_FRAMES}"
-        )));
-    }
-    if cut {
+    let is_cut = args.start.is_some() || args.end.is_some();
+    if is_cut {
+        let intervals = ((end_s - start_s) / take.dt_s).round().max(1.0) as usize;
         take = take.part(start_s, end_s, intervals + 1);
     }
-    if kind == ClipKind::Cycle {
-        warn_open(&take, args);
-    }
-    let clip = take.to_clip(kind, frames);
+    let clip = match (args.cycle, args.kind) {
+        (Some(Found::Auto), _) | (None, Some(Kind::Cycle)) => cycle_of(&take, args)?,
+        (None, None) if take.wraps && !is_cut => cycle_of(&take, args)?,
+        (None, _) => {
+            let frames = frames(args, take.len(), 2)?;
+            take.to_clip(ClipKind::Path, frames)
+        }
+    };
+    let duration_s = match clip.kind {
+        ClipKind::Cycle => 1.0 / clip.frequency_hz.max(1e-9),
+        ClipKind::Path => take.duration_s(),
+    };
     let text = clip.to_json();
     // What is written must be readable: a cycle in which a joint turns round is found here.
     let clip = ClipFile::from_json(&text).map_err(|e| bad(e.to_string()))?;
     std::fs::write(&args.out, text)
         .map_err(|e| Failure::input(format!("cannot write {}: {e}", args.out.display())))?;
-    report(args, &clip, end_s - start_s);
+    report(args, &clip, duration_s);
     Ok(ExitStatus::Done)
 }
 
-/// Says so where the end of a cycle is not its start.
-fn warn_open(take: &Take, args: &ImportArgs) {
-    if let Some((name, gap)) = take.gap()
-        && gap > OPEN_RAD
-    {
+/// As many frames as asked for, else `usual`.
+fn frames(args: &ImportArgs, usual: usize, least: usize) -> Result<usize, Failure> {
+    let frames = args.frames.unwrap_or(usual.clamp(least, MOST_FRAMES));
+    if (least..=MOST_FRAMES).contains(&frames) {
+        return Ok(frames);
+    }
+    Err(Failure::input(format!(
+        "{}: --frames {frames} must lie in {least} to {MOST_FRAMES}",
+        args.file.display()
+    )))
+}
+
+/// One closed cycle of a take: the one that is found, or the whole.
+fn cycle_of(take: &Take, args: &ImportArgs) -> Result<ClipFile, Failure> {
+    let bad = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", args.file.display()));
+    let model = match &args.urdf {
+        None => None,
+        Some(urdf) => {
+            let bad =
+                |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", urdf.display()));
+            let text = std::fs::read_to_string(urdf).map_err(|e| bad(&e))?;
+            Some(RobotModel::from_urdf(&text).map_err(|e| bad(&e))?)
+        }
+    };
+    let body = BodyModel::of(take, model.as_ref()).map_err(|e| bad(&e))?;
+    if let Some(note) = &body.note {
         warn(format_args!(
-            "{}: the cycle does not close: {name} ends {gap:.3} from where it began; --start and --end may mark a better one",
+            "{}: no limbs in the clip: {note}",
             args.file.display()
         ));
     }
+    let auto = args.cycle.is_some();
+    let whole = if auto {
+        cycle::find(&Features::of(take, body.space()), take).map_err(|e| bad(&e))?
+    } else {
+        Cycle {
+            start: 0,
+            frames: take.len().saturating_sub(1) as f64,
+            frequency_hz: 1.0 / take.duration_s().max(1e-9),
+            likeness: 1.0,
+            closed: true,
+        }
+    };
+    let mut way = travel::of(take);
+    let feet = match body.feet() {
+        Some(feet) => contact::find(take, feet, Some(&whole), &mut way),
+        None => Vec::new(),
+    };
+    let options = CutOptions {
+        frames: frames(args, whole.frames.round() as usize, 8)?,
+        // Who says where the cycle is has it closed there; it is said below how far.
+        most_seam: if auto {
+            CutOptions::default().most_seam
+        } else {
+            f64::INFINITY
+        },
+        ..CutOptions::default()
+    };
+    let made = cut::cycle(take, &body, &whole, &feet, &options).map_err(|e| bad(&e))?;
+    if auto {
+        let start_s = args.start.unwrap_or(0.0) + whole.start as f64 * take.dt_s;
+        warn(format_args!(
+            "{}: cycle found from {start_s:.3} s, {:.3} Hz (likeness {:.2})",
+            args.file.display(),
+            whole.frequency_hz,
+            whole.likeness
+        ));
+    }
+    if made.seam.share > OPEN {
+        warn(format_args!(
+            "{}: the ends of the cycle were {:.3} m apart ({:.0} % of the motion) and were joined",
+            args.file.display(),
+            made.seam.distance_m,
+            100.0 * made.seam.share
+        ));
+    }
+    Ok(made.clip)
 }
 
 fn report(args: &ImportArgs, clip: &ClipFile, duration_s: f64) {
