@@ -9,15 +9,21 @@ mod feet;
 mod joint_space;
 mod robot_feet;
 mod root;
+mod side;
 mod skeleton;
+mod skeleton_feet;
 mod skeleton_space;
+mod skin;
 
 pub use feet::Feet;
 pub use joint_space::{BODY, JointSpace};
 pub use robot_feet::RobotFeet;
 pub use root::{RootAdvance, RootPose};
+pub use side::{Side, mirrored, other_side};
 pub use skeleton::{Skeleton, SkeletonError, SkeletonJoint};
+pub use skeleton_feet::{SkeletonFeet, SkeletonFeetError, SkeletonLeg};
 pub use skeleton_space::SkeletonSpace;
+pub use skin::{Influence, SkinBone, SkinError, SkinnedMesh};
 
 use std::ops::Range;
 

@@ -4,10 +4,12 @@
 //! of clips indexed by amplitude and frequency, [`graph`] moves between classes, [`animator`] is
 //! the whole: gesture waves in, poses out.
 
+pub mod analysis;
 pub mod animator;
 pub mod class;
 pub mod clip;
 pub mod edge;
+pub mod export;
 pub mod gait;
 pub mod gait_frames;
 mod gait_paths;
@@ -15,11 +17,13 @@ mod gait_plan;
 mod gait_presets;
 mod gait_stance;
 pub mod graph;
+pub mod import;
 pub mod inertia;
 pub mod inverse;
 pub mod layer;
 mod limbs;
 pub mod mapping;
+pub mod metrics;
 pub mod node;
 pub mod pins;
 pub mod range;

@@ -6,6 +6,7 @@ pub mod counting;
 pub mod data;
 pub mod folder;
 pub mod limits;
+pub mod motion;
 pub mod program;
 pub mod recipe;
 pub mod simulator;
