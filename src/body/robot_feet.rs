@@ -54,11 +54,7 @@ impl Feet for RobotFeet {
         let (joints, body) = pose.split_at_mut(self.joints);
         let goal = body_pose(body).inverse_transform_point(&goal);
         let goal = self.facing.inverse_transform_point(&goal);
-        let leg = &self.legs[foot];
-        match leg.place_foot(&self.model, goal, joints) {
-            Ok(()) => 0.0,
-            Err(_) => (leg.foot_position(&self.model, joints) - goal).norm(),
-        }
+        self.legs[foot].reach(goal, joints)
     }
 
     fn shift(&self, pose: &mut [f64], way: Vector3<f64>) {

@@ -434,6 +434,12 @@ impl Feet for SkeletonFeet {
         (self.position(pose, foot) - goal).norm()
     }
 
+    fn shift(&self, pose: &mut [f64], way: Vector3<f64>) {
+        for (coordinate, way) in pose.iter_mut().zip(way.iter()) {
+            *coordinate += way;
+        }
+    }
+
     fn reach_m(&self, foot: usize) -> f64 {
         self.reach_m[foot]
     }

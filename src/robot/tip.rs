@@ -81,6 +81,7 @@ impl RobotModel {
             };
             self.tips[mesh.link] = stl_points(&bytes)
                 .map(|p| mesh.place * Point3::from(p.component_mul(&mesh.scale)))
+                .filter(|p| p.coords.iter().all(|v| v.is_finite()))
                 .max_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
         }
     }

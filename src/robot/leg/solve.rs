@@ -25,6 +25,8 @@ pub(super) struct Planar {
     shank: Vector3<f64>,
     /// +1 or -1: sense of the third axis along the second.
     sense: f64,
+    /// The axes are parallel to rounding: nothing to mend.
+    exact: bool,
 }
 
 impl Planar {
@@ -58,6 +60,7 @@ impl Planar {
             thigh: flat(to_knee),
             shank: flat(to_foot),
             sense: axis.dot(&knee_axis).signum(),
+            exact: axis.cross(&knee_axis).norm() < 1e-12,
         })
     }
 
@@ -130,7 +133,9 @@ impl Planar {
         let mut count = 0;
         for mut q in raw.into_iter().take(found) {
             // Axes that are parallel only nearly: mend before the limits are judged.
-            polish(chain, goal, &mut q);
+            if !self.exact {
+                polish(chain, goal, &mut q);
+            }
             let fits = (0..3).all(|i| {
                 q[i] = nearest_turn(q[i], near[i], chain.limits[i]);
                 let (lower, upper) = chain.limits[i];
