@@ -5,13 +5,14 @@
 
 mod support;
 
+use handwave::body::{Feet, SkeletonFeet};
 use handwave::motion::analysis::cut::{self, CutOptions};
 use handwave::motion::analysis::gait::{Gait, apart};
 use handwave::motion::analysis::mirror::{Mirror, farthest, symmetry};
 use handwave::motion::analysis::{Analysis, BodyModel, analyse};
 use handwave::motion::clip::ClipFile;
 use handwave::motion::import::{ImportOptions, open};
-use handwave::motion::take::Take;
+use handwave::motion::take::{Take, TakeBody};
 use handwave::robot::RobotModel;
 use std::path::Path;
 use support::data::shared_data;
@@ -413,5 +414,46 @@ fn wrong_files_and_robots_end_with_their_name_and_what_is_allowed() {
         all.extend(args);
         let ended = handwave(&all).expect(2);
         assert!(ended.err.contains(words), "{words}: {}", ended.err);
+    }
+}
+
+#[test]
+fn feet_of_foxes_dogs_and_humans_are_found_and_go_where_they_are_put() {
+    let fox = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/avatars/fox.glb");
+    let mut files = vec![(fox.display().to_string() + "#Walk", 4)];
+    for (file, count) in [
+        ("quadruped/dog3d/dog3d_trot.txt", 4),
+        ("human_joint/humanoid3d_run.txt", 2),
+        ("human_bvh/dataset-2_walk_normal_001.bvh", 2),
+        ("human_cmu/02_01.amc", 2),
+    ] {
+        files.extend(shared_data(file).map(|p| (p.display().to_string(), count)));
+    }
+    for (file, count) in files {
+        let imported = open(Path::new(&file), &ImportOptions::default()).expect(&file);
+        let take = &imported.takes[0];
+        let TakeBody::Skeleton(skeleton) = &take.body else {
+            panic!("{file}: no skeleton");
+        };
+        let shown: Vec<&[f64]> = take.poses.iter().map(Vec::as_slice).collect();
+        let feet = SkeletonFeet::find(skeleton.clone(), &shown).expect(&file);
+        assert_eq!(feet.count(), count, "{file}: {:?}", feet.legs());
+        for (k, pose) in take.poses.iter().enumerate().step_by(3) {
+            for foot in 0..count {
+                // Where this foot is a few frames on, which its leg is known to reach from its own hip.
+                let hip = feet.legs()[foot].hip;
+                let other = &take.poses[(k + 5) % take.len()];
+                let way = feet.position(other, foot) - skeleton.position(other, hip);
+                let goal = skeleton.position(pose, hip) + way;
+                let mut placed = pose.clone();
+                let left = feet.place(&mut placed, foot, goal);
+                let bound = 1e-6 * feet.reach_m(foot).max(1.0);
+                assert!(
+                    left < bound,
+                    "{file}, frame {k}, {}: {left} m off",
+                    feet.name(foot)
+                );
+            }
+        }
     }
 }
