@@ -5,13 +5,14 @@
 
 mod support;
 
+use handwave::body::{Feet, SkeletonFeet};
 use handwave::motion::analysis::cut::{self, CutOptions};
 use handwave::motion::analysis::gait::{Gait, apart};
 use handwave::motion::analysis::mirror::{Mirror, farthest, symmetry};
 use handwave::motion::analysis::{Analysis, BodyModel, analyse};
 use handwave::motion::clip::ClipFile;
 use handwave::motion::import::{ImportOptions, open};
-use handwave::motion::take::Take;
+use handwave::motion::take::{Take, TakeBody};
 use handwave::robot::RobotModel;
 use std::path::Path;
 use support::data::shared_data;
@@ -82,253 +83,53 @@ fn phases(found: &Analysis) -> Vec<(&str, Option<f64>, f64)> {
 }
 
 #[test]
+#[rustfmt::skip]
 fn robots_that_walk_as_dogs_did_have_the_cycles_speeds_and_gaits_of_their_notes() {
     hold(&[
-        (
-            "quadruped/a1/trot0.txt",
-            A1,
-            1.488,
-            0.001,
-            1.17,
-            Some(Gait::Trot),
-        ),
-        (
-            "quadruped/a1/trot1.txt",
-            A1,
-            1.488,
-            0.001,
-            1.15,
-            Some(Gait::Trot),
-        ),
-        (
-            "quadruped/a1/pace0.txt",
-            A1,
-            1.253,
-            0.001,
-            0.71,
-            Some(Gait::Pace),
-        ),
-        (
-            "quadruped/a1/gallop_forward0.json",
-            A1,
-            2.19,
-            0.02,
-            1.99,
-            Some(Gait::Gallop),
-        ),
-        (
-            "quadruped/a1/trot_forward0.json",
-            A1,
-            1.61,
-            0.02,
-            0.66,
-            None,
-        ),
-        (
-            "quadruped/laikago/dog_pace.txt",
-            LAIKAGO,
-            1.579,
-            0.001,
-            1.09,
-            Some(Gait::Pace),
-        ),
-        (
-            "quadruped/laikago/dog_trot.txt",
-            LAIKAGO,
-            1.875,
-            0.001,
-            1.75,
-            Some(Gait::Trot),
-        ),
-        (
-            "quadruped/laikago/dog_backwards_pace.txt",
-            LAIKAGO,
-            1.579,
-            0.001,
-            -1.09,
-            Some(Gait::Pace),
-        ),
-        (
-            "quadruped/laikago/dog_backwards_trot.txt",
-            LAIKAGO,
-            1.875,
-            0.001,
-            -1.75,
-            Some(Gait::Trot),
-        ),
+        ("quadruped/a1/trot0.txt", A1, 1.488, 0.001, 1.17, Some(Gait::Trot)),
+        ("quadruped/a1/trot1.txt", A1, 1.488, 0.001, 1.15, Some(Gait::Trot)),
+        ("quadruped/a1/pace0.txt", A1, 1.253, 0.001, 0.71, Some(Gait::Pace)),
+        ("quadruped/a1/gallop_forward0.json", A1, 2.19, 0.02, 1.99, Some(Gait::Gallop)),
+        ("quadruped/a1/trot_forward0.json", A1, 1.61, 0.02, 0.66, None),
+        ("quadruped/laikago/dog_pace.txt", LAIKAGO, 1.579, 0.001, 1.09, Some(Gait::Pace)),
+        ("quadruped/laikago/dog_trot.txt", LAIKAGO, 1.875, 0.001, 1.75, Some(Gait::Trot)),
+        ("quadruped/laikago/dog_backwards_pace.txt", LAIKAGO, 1.579, 0.001, -1.09, Some(Gait::Pace)),
+        ("quadruped/laikago/dog_backwards_trot.txt", LAIKAGO, 1.875, 0.001, -1.75, Some(Gait::Trot)),
     ]);
 }
 
 #[test]
+#[rustfmt::skip]
 fn skeletons_of_dogs_and_humans_have_the_cycles_and_speeds_of_their_notes() {
     hold(&[
-        (
-            "quadruped/dog3d/dog3d_pace.txt",
-            None,
-            1.579,
-            0.001,
-            1.41,
-            Some(Gait::Pace),
-        ),
-        (
-            "quadruped/dog3d/dog3d_trot.txt",
-            None,
-            1.935,
-            0.001,
-            2.40,
-            Some(Gait::Trot),
-        ),
-        (
-            "quadruped/dog3d/dog3d_canter.txt",
-            None,
-            2.222,
-            0.001,
-            5.05,
-            None,
-        ),
-        (
-            "human_joint/humanoid3d_walk.txt",
-            None,
-            0.789,
-            0.002,
-            0.98,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_joint/humanoid3d_jog.txt",
-            None,
-            1.20,
-            0.002,
-            2.80,
-            Some(Gait::Run),
-        ),
-        (
-            "human_joint/humanoid3d_run.txt",
-            None,
-            1.25,
-            0.002,
-            3.56,
-            Some(Gait::Run),
-        ),
+        ("quadruped/dog3d/dog3d_pace.txt", None, 1.579, 0.001, 1.41, Some(Gait::Pace)),
+        ("quadruped/dog3d/dog3d_trot.txt", None, 1.935, 0.001, 2.40, Some(Gait::Trot)),
+        ("quadruped/dog3d/dog3d_canter.txt", None, 2.222, 0.001, 5.05, None),
+        ("human_joint/humanoid3d_walk.txt", None, 0.789, 0.002, 0.98, Some(Gait::Walk)),
+        ("human_joint/humanoid3d_jog.txt", None, 1.20, 0.002, 2.80, Some(Gait::Run)),
+        ("human_joint/humanoid3d_run.txt", None, 1.25, 0.002, 3.56, Some(Gait::Run)),
     ]);
 }
 
 #[test]
+#[rustfmt::skip]
 fn recorded_walkers_have_the_stride_frequencies_of_their_notes() {
     // Short runs: the notes themselves are uncertain by about 0.1 Hz.
     hold(&[
-        (
-            "human_bvh/dataset-1_walk_normal_001.bvh",
-            None,
-            0.930,
-            0.02,
-            1.25,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_bvh/dataset-2_walk_normal_001.bvh",
-            None,
-            0.908,
-            0.02,
-            1.11,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_bvh/dataset-2_walk_active_001.bvh",
-            None,
-            0.989,
-            0.02,
-            1.43,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_bvh/dataset-2_walk_exhausted_001.bvh",
-            None,
-            0.886,
-            0.02,
-            1.00,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_bvh/dataset-2_walk_elderly_001.bvh",
-            None,
-            0.941,
-            0.02,
-            0.74,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_bvh/dataset-2_run_exhausted_001.bvh",
-            None,
-            1.230,
-            0.02,
-            1.90,
-            Some(Gait::Run),
-        ),
-        (
-            "human_bvh/dataset-2_run_elderly_001.bvh",
-            None,
-            1.157,
-            0.02,
-            1.18,
-            None,
-        ),
-        (
-            "human_bvh/dataset-1_dash_happy_001.bvh",
-            None,
-            1.553,
-            0.02,
-            2.45,
-            Some(Gait::Run),
-        ),
-        (
-            "human_bvh/dataset-2_run_active_001.bvh",
-            None,
-            1.07,
-            0.1,
-            3.42,
-            Some(Gait::Run),
-        ),
-        (
-            "human_bvh/dataset-1_run_active_001.bvh",
-            None,
-            1.06,
-            0.1,
-            2.51,
-            Some(Gait::Run),
-        ),
-        (
-            "human_bvh/dataset-2_run_normal_001.bvh",
-            None,
-            1.318,
-            0.03,
-            3.60,
-            Some(Gait::Run),
-        ),
-        (
-            "human_cmu/02_01.amc",
-            None,
-            0.908,
-            0.02,
-            1.18,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_cmu/02_02.amc",
-            None,
-            1.025,
-            0.02,
-            1.63,
-            Some(Gait::Walk),
-        ),
-        (
-            "human_cmu/02_03.amc",
-            None,
-            1.26,
-            0.08,
-            2.58,
-            Some(Gait::Run),
-        ),
+        ("human_bvh/dataset-1_walk_normal_001.bvh", None, 0.930, 0.02, 1.25, Some(Gait::Walk)),
+        ("human_bvh/dataset-2_walk_normal_001.bvh", None, 0.908, 0.02, 1.11, Some(Gait::Walk)),
+        ("human_bvh/dataset-2_walk_active_001.bvh", None, 0.989, 0.02, 1.43, Some(Gait::Walk)),
+        ("human_bvh/dataset-2_walk_exhausted_001.bvh", None, 0.886, 0.02, 1.00, Some(Gait::Walk)),
+        ("human_bvh/dataset-2_walk_elderly_001.bvh", None, 0.941, 0.02, 0.74, Some(Gait::Walk)),
+        ("human_bvh/dataset-2_run_exhausted_001.bvh", None, 1.230, 0.02, 1.90, Some(Gait::Run)),
+        ("human_bvh/dataset-2_run_elderly_001.bvh", None, 1.157, 0.02, 1.18, None),
+        ("human_bvh/dataset-1_dash_happy_001.bvh", None, 1.553, 0.02, 2.45, Some(Gait::Run)),
+        ("human_bvh/dataset-2_run_active_001.bvh", None, 1.07, 0.1, 3.42, Some(Gait::Run)),
+        ("human_bvh/dataset-1_run_active_001.bvh", None, 1.06, 0.1, 2.51, Some(Gait::Run)),
+        ("human_bvh/dataset-2_run_normal_001.bvh", None, 1.318, 0.03, 3.60, Some(Gait::Run)),
+        ("human_cmu/02_01.amc", None, 0.908, 0.02, 1.18, Some(Gait::Walk)),
+        ("human_cmu/02_02.amc", None, 1.025, 0.02, 1.63, Some(Gait::Walk)),
+        ("human_cmu/02_03.amc", None, 1.26, 0.08, 2.58, Some(Gait::Run)),
     ]);
 }
 
@@ -613,5 +414,46 @@ fn wrong_files_and_robots_end_with_their_name_and_what_is_allowed() {
         all.extend(args);
         let ended = handwave(&all).expect(2);
         assert!(ended.err.contains(words), "{words}: {}", ended.err);
+    }
+}
+
+#[test]
+fn feet_of_foxes_dogs_and_humans_are_found_and_go_where_they_are_put() {
+    let fox = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/avatars/fox.glb");
+    let mut files = vec![(fox.display().to_string() + "#Walk", 4)];
+    for (file, count) in [
+        ("quadruped/dog3d/dog3d_trot.txt", 4),
+        ("human_joint/humanoid3d_run.txt", 2),
+        ("human_bvh/dataset-2_walk_normal_001.bvh", 2),
+        ("human_cmu/02_01.amc", 2),
+    ] {
+        files.extend(shared_data(file).map(|p| (p.display().to_string(), count)));
+    }
+    for (file, count) in files {
+        let imported = open(Path::new(&file), &ImportOptions::default()).expect(&file);
+        let take = &imported.takes[0];
+        let TakeBody::Skeleton(skeleton) = &take.body else {
+            panic!("{file}: no skeleton");
+        };
+        let shown: Vec<&[f64]> = take.poses.iter().map(Vec::as_slice).collect();
+        let feet = SkeletonFeet::find(skeleton.clone(), &shown).expect(&file);
+        assert_eq!(feet.count(), count, "{file}: {:?}", feet.legs());
+        for (k, pose) in take.poses.iter().enumerate().step_by(3) {
+            for foot in 0..count {
+                // Where this foot is a few frames on, which its leg is known to reach from its own hip.
+                let hip = feet.legs()[foot].hip;
+                let other = &take.poses[(k + 5) % take.len()];
+                let way = feet.position(other, foot) - skeleton.position(other, hip);
+                let goal = skeleton.position(pose, hip) + way;
+                let mut placed = pose.clone();
+                let left = feet.place(&mut placed, foot, goal);
+                let bound = 1e-6 * feet.reach_m(foot).max(1.0);
+                assert!(
+                    left < bound,
+                    "{file}, frame {k}, {}: {left} m off",
+                    feet.name(foot)
+                );
+            }
+        }
     }
 }

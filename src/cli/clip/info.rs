@@ -41,7 +41,9 @@ pub const EXAMPLES: &str = "Examples:
 
 Feet stand where they are low and slow. Touch-down is a fraction of the cycle; in the
 bar each block is 1/32 of the cycle on the ground. Slide is the way of a foot over the
-ground while it stands; jerk is that of the whole cycle over that of a sine (1: smoothest).";
+ground while it stands, ground the height of the foot's joint then. Jerk is that of the
+whole cycle over that of a sine (1: smoothest). Mirror images and a robot's feet need
+its URDF.";
 
 /// One take with all that was found out about it.
 struct Findings {

@@ -270,8 +270,8 @@ fn clean(contact: &mut [bool], shortest: usize, closed: bool) {
 fn runs(contact: &[bool], value: bool, closed: bool) -> Vec<(usize, usize)> {
     let n = contact.len();
     let mut found: Vec<(usize, usize)> = Vec::new();
-    for k in 0..n {
-        if contact[k] != value {
+    for (k, contact) in contact.iter().enumerate() {
+        if *contact != value {
             continue;
         }
         match found.last_mut() {

@@ -27,6 +27,9 @@ impl Default for CutOptions {
     }
 }
 
+/// Smoothing a kink moves a coordinate by at most this share of its range.
+const MOST_BENT: f64 = 0.05;
+
 /// How far the ends of a cycle were apart before they were joined.
 #[derive(Copy, Clone, Debug, Default, PartialEq)]
 pub struct Seam {
@@ -126,13 +129,19 @@ fn close(space: &dyn PoseSpace, poses: &mut [Vec<f64>], extent_m: f64) -> Seam {
     };
     let gap = between(&poses[n], &poses[0]);
     let distance_m = space.distance(&poses[n], &poses[0]);
-    // Slopes per cycle at either end.
-    let (after, before) = (
-        between(&poses[0], &poses[1]),
-        between(&poses[n - 1], &poses[n]),
-    );
-    let kink: Vec<f64> = (after.iter().zip(before))
-        .map(|(a, b)| (a - b) * n as f64)
+    // Slopes per cycle at either end, to second order: a motion that only bends there has no kink. A hard
+    // kink is left to the spline: smoothing it away would bend the whole cycle.
+    let step = |k: usize| between(&poses[k], &poses[k + 1]);
+    let (a, b, y, z) = (step(0), step(1), step(n - 2), step(n - 1));
+    let from_first: Vec<Vec<f64>> = poses.iter().map(|p| between(&poses[0], p)).collect();
+    let kink: Vec<f64> = (0..gap.len())
+        .map(|c| {
+            let (after, before) = (1.5 * a[c] - 0.5 * b[c], 1.5 * z[c] - 0.5 * y[c]);
+            let values = from_first.iter().map(|v| v[c]);
+            let range = values.clone().fold(0.0, f64::max) - values.fold(0.0, f64::min);
+            let most = 8.0 * MOST_BENT * range;
+            ((after - before) * n as f64).clamp(-most, most)
+        })
         .collect();
     let mut moved = 0.0_f64;
     for (k, pose) in poses.iter_mut().enumerate() {

@@ -59,7 +59,7 @@ pub fn apart(a: f64, b: f64) -> f64 {
 /// that is between the feet of an even walk, since recordings have few frames a cycle.
 const TOGETHER: f64 = 0.14;
 /// Feet that touch down within this share follow each other.
-const NEAR: f64 = 0.28;
+const NEAR: f64 = 0.3;
 
 /// The gait of two feet (`left`, `right`) or four (`front_left`, ...); `None` for others, or where a foot
 /// never touches down.
@@ -106,9 +106,9 @@ pub fn guess(feet: &[FootContact]) -> Option<Gait> {
     } else if duty < 0.4 && diagonals[0].min(diagonals[1]) < TOGETHER && ends[0].max(ends[1]) < 0.42
     {
         Gait::Canter
-    } else if duty < 0.5 && all(ends, NEAR + 0.07) {
+    } else if duty < 0.5 && all(ends, NEAR) {
         Gait::Gallop
-    } else if ends[0].min(ends[1]) > 0.35 {
+    } else if 0.5 * (ends[0] + ends[1]) > 0.33 {
         Gait::Walk
     } else {
         Gait::Other

@@ -32,8 +32,7 @@ pub struct Analysis {
     pub gait: Option<Gait>,
     /// How smoothly every coordinate of a difference moves, see [`crate::body::PoseSpace`].
     pub smoothness: Vec<Smoothness>,
-    /// Largest angle or way between the poses, metres (root mean square over features): the scale of
-    /// seams.
+    /// Root mean square way of a feature from its mean, metres: the scale of seams.
     pub extent_m: f64,
 }
 

@@ -60,7 +60,8 @@ fn body(take: &Take) -> BodyModel {
 fn takes_that_are_no_motion_are_refused_with_their_place() {
     let good = swinging(1.0, 2.0, 0.02, 0.0);
     let body = body(&good);
-    let broken: [(&str, fn(&mut Take)); 5] = [
+    type Break = (&'static str, fn(&mut Take));
+    let broken: [Break; 5] = [
         ("2 are needed", |t| {
             t.poses.truncate(1);
             t.roots.truncate(1);

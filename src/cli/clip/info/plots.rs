@@ -173,7 +173,7 @@ fn speed(findings: &Findings, window: &Window, x: Axis) -> Panel {
     }
 }
 
-/// One panel per limb: its joints over the cycle, with limits where they are near.
+/// One panel per limb: its joints over the cycle, with limits as wide lines where they are near.
 fn limbs(findings: &Findings, window: &Window, x: impl Fn() -> Axis) -> Vec<Panel> {
     const SHOWN: usize = 4;
     let take = &findings.take;
@@ -223,7 +223,7 @@ fn limbs(findings: &Findings, window: &Window, x: impl Fn() -> Axis) -> Vec<Pane
             let room = 0.25 * (y.range.1 - y.range.0);
             for v in [limit.lower, limit.upper] {
                 if v > y.range.0 - room && v < y.range.1 + room {
-                    y.range = (y.range.0.min(v - 0.02), y.range.1.max(v + 0.02));
+                    y.range = (y.range.0.min(v - 0.1), y.range.1.max(v + 0.1));
                     drawn.push(Series {
                         style: Style::Wide,
                         ..series("", i + 1, vec![(0.0, v), (1.0, v)])
