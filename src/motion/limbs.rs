@@ -17,10 +17,13 @@ pub(super) struct Timelines {
 }
 
 /// The timelines of `clips`, with the limbs of the reference: the slowest moving clip (the longest).
+///
+/// Where limbs are not `apart` from the body they have no offsets: clips blend at the common phase.
 pub(super) fn timelines(
     class: &str,
     clips: &[&Clip],
     coordinates: usize,
+    apart: bool,
 ) -> Result<Timelines, ClassError> {
     let moves = |clip: &Clip| clip.limbs.iter().any(|l| l.duty < 1.0);
     let slowest = |clips: &mut dyn Iterator<Item = &'_ &'_ Clip>| {
@@ -45,7 +48,7 @@ pub(super) fn timelines(
             limb_of[*coordinate] = Some(i);
         }
     }
-    let offsets = clips
+    let offsets: Vec<Option<Vec<f64>>> = clips
         .iter()
         .map(|clip| {
             if !moves(clip) {
@@ -68,6 +71,12 @@ pub(super) fn timelines(
                 .map(Some)
         })
         .collect::<Result<_, _>>()?;
+    // Checked above all the same: a limb that a clip lacks is an error either way.
+    let offsets: Vec<Option<Vec<f64>>> = if apart {
+        offsets
+    } else {
+        vec![None; clips.len()]
+    };
     Ok(Timelines {
         limbs: reference.into_iter().map(|l| l.name).collect(),
         limb_of,

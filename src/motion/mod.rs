@@ -6,6 +6,7 @@
 
 pub mod analysis;
 pub mod animator;
+pub mod blending;
 pub mod class;
 pub mod clip;
 pub mod edge;

@@ -92,7 +92,7 @@ pub struct ClassOptions {
     pub leave: Vec<[f64; 2]>,
     /// Part of the phase advance that a limb may gain or lose against the body: 0.05, so that it stays
     /// between 0.95 and 1.05 of it (eq. 9.7). Larger values let limbs change their phase sooner and slide more;
-    /// 0 gives limbs no timelines of their own.
+    /// 0 gives limbs no timelines of their own: clips blend at the common phase, whatever their legs do then.
     pub limb_advance: f64,
     /// How parameters become weights.
     pub weights: WeightKind,
@@ -160,7 +160,7 @@ impl MotionClass {
         }
         let clips: Vec<&Clip> = examples.iter().map(|e| &e.clip).collect();
         let steepness = Steepness::of(&clips);
-        let timelines = timelines(name, &clips, coordinates)?;
+        let timelines = timelines(name, &clips, coordinates, options.limb_advance > 0.0)?;
         let contacts = contacts(&clips, &timelines.limbs);
         let (count, limbs) = (examples.len(), timelines.limbs.len());
         let frequency = weights_map.frequencies().0;

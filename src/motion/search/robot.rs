@@ -111,7 +111,7 @@ impl ClipBlend {
         let clips: Vec<&Clip> = blended.map(|e| &e.clip).collect();
         let Timelines {
             limb_of, offsets, ..
-        } = timelines(name, &clips, first.clip.coordinates())?;
+        } = timelines(name, &clips, first.clip.coordinates(), true)?;
         let over = |d: usize, pick: fn(f64, f64) -> f64| {
             parameters.iter().map(|p| p[d]).fold(parameters[0][d], pick)
         };
