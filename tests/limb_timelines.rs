@@ -72,7 +72,8 @@ fn recorded(file: &str, urdf: Option<&str>) -> Option<(BodyModel, ClipFile)> {
     let body = BodyModel::of(&take, model.as_ref()).expect("its body");
     let found = analyse(&take, &body).expect("a motion");
     let cycle = found.cycle.expect("a cycle");
-    let cut = cut::cycle(&take, &body, &cycle, &found.feet, &cut::CutOptions::default());
+    let options = cut::CutOptions { most_seam: 1.0, ..cut::CutOptions::default() };
+    let cut = cut::cycle(&take, &body, &cycle, &found.feet, &options);
     Some((body, cut.expect("a clip").clip))
 }
 

@@ -1,5 +1,6 @@
 //! `handwave clip`: bring motion in and out; author gaits for a legged URDF; look into a clip.
 
+mod blend;
 mod export;
 mod gait;
 mod import;
@@ -21,6 +22,9 @@ enum ClipCommand {
     /// Bring a motion of another program in: glTF, BVH, AMC, joint-space JSON and CSV
     #[command(after_help = import::EXAMPLES)]
     Import(Box<import::ImportArgs>),
+    /// Blend two gaits at several weights: slide of the feet, hanging legs
+    #[command(after_help = blend::EXAMPLES)]
+    Blend(Box<blend::BlendArgs>),
     /// Write a clip for other programs: BVH, CSV, glTF
     #[command(after_help = export::EXAMPLES)]
     Export(Box<export::ExportArgs>),
@@ -36,6 +40,7 @@ enum ClipCommand {
 pub fn run(args: &ClipArgs) -> Result<ExitStatus, Failure> {
     match &args.command {
         ClipCommand::Import(args) => import::run(args),
+        ClipCommand::Blend(args) => blend::run(args),
         ClipCommand::Export(args) => export::run(args),
         ClipCommand::Gait(args) => gait::run(args),
         ClipCommand::Info(args) => info::run(args),

@@ -35,7 +35,11 @@ impl ClipFile {
         };
         let mut columns: Vec<Option<usize>> = Vec::with_capacity(space.len());
         for part in space.parts() {
-            let found = own.iter().find(|(name, _)| *name == part.name);
+            // A skeleton's place is called root, and some have a joint of that name too.
+            let same = |(name, _): &&(_, Range<usize>)| *name == part.name;
+            let found = (own.iter().filter(same))
+                .find(|(_, range)| range.len() == part.coordinates.len())
+                .or_else(|| own.iter().find(same));
             match found {
                 Some((_, range)) if range.len() == part.coordinates.len() => {
                     columns.extend(range.clone().map(Some));
