@@ -256,11 +256,12 @@ fn the_hand_of_the_arm_is_as_high_as_the_performers() {
             .map(|(then, now)| (now.2 - expected_m(then.0, now.1)).abs())
             .fold(0.0, f64::max)
     };
-    let (late, worst_m) = (0..200)
-        .map(|late| (late, off_m(late)))
-        .fold((0, f64::INFINITY), |best, next| {
-            if next.1 < best.1 { next } else { best }
-        });
+    let (late, worst_m) =
+        (0..200)
+            .map(|late| (late, off_m(late)))
+            .fold((0, f64::INFINITY), |best, next| {
+                if next.1 < best.1 { next } else { best }
+            });
     let (late_s, share) = (late as f64 / RATE_HZ, worst_m / RANGE_M);
     println!(
         "hand at {:.3} to {:.3} m (progression {:.3}), arm's at {:.4} to {:.4} m, {late_s:.2} s late, else at most {:.2} mm off ({:.2} % of the range; {:.2} mm with the delay), never lower by more than {:.4} mm a cycle",

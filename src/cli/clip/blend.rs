@@ -113,9 +113,8 @@ fn cycle_of(
     args: &BlendArgs,
     model: Option<&RobotModel>,
 ) -> Result<(BodyModel, ClipFile), Failure> {
-    let bad = |problem: &dyn std::fmt::Display| {
-        Failure::input(format!("{}: {problem}", path.display()))
-    };
+    let bad =
+        |problem: &dyn std::fmt::Display| Failure::input(format!("{}: {problem}", path.display()));
     let clip = std::fs::read_to_string(path)
         .ok()
         .and_then(|text| ClipFile::from_json(&text).ok());
@@ -129,7 +128,8 @@ fn cycle_of(
     let take = args.source.read(path)?;
     let body = BodyModel::of(&take, model).map_err(|e| bad(&e))?;
     let found = analyse(&take, &body).map_err(|e| bad(&e))?;
-    let cycle = (found.cycle).ok_or_else(|| bad(&"no cycle is found; gaits to blend are cycles"))?;
+    let cycle =
+        (found.cycle).ok_or_else(|| bad(&"no cycle is found; gaits to blend are cycles"))?;
     let options = cut::CutOptions {
         most_seam: 1.0,
         ..cut::CutOptions::default()
@@ -189,7 +189,9 @@ fn figure(a: &str, b: &str, foot: &str, rows: &[[Blended; 2]]) -> Figure {
     };
     let against = |value: fn(&Blended) -> f64| {
         [0, 1].map(|way| -> Vec<(f64, f64)> {
-            rows.iter().map(|r| (r[way].weight, value(&r[way]))).collect()
+            rows.iter()
+                .map(|r| (r[way].weight, value(&r[way])))
+                .collect()
         })
     };
     let panel = |title: String, x: Axis, label: &str, lines: [Vec<(f64, f64)>; 2], style| {
@@ -217,7 +219,10 @@ fn figure(a: &str, b: &str, foot: &str, rows: &[[Blended; 2]]) -> Figure {
         columns: 1,
         panels: vec![
             panel(
-                format!("{foot} over the ground at a share of {:.2}", middle[0].weight),
+                format!(
+                    "{foot} over the ground at a share of {:.2}",
+                    middle[0].weight
+                ),
                 Axis::linear("fraction of the cycle", 0.0, 1.0),
                 "height, mm",
                 [heights(&middle[0]), heights(&middle[1])],
