@@ -10,6 +10,7 @@ use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
 use crate::motion::class::{Drive, EXTRA};
 use crate::motion::layer::{ChannelMap, LayerInput};
 use crate::motion::mapping::Seen;
+pub use crate::motion::node::ClassInput;
 use crate::motion::{Animator, ease};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
@@ -89,21 +90,6 @@ pub struct Targets {
     pub pose_age_s: Option<f64>,
     /// Poses are older than the limit while they should be driving the robot.
     pub poses_lost: bool,
-}
-
-/// What drives a class.
-#[derive(Copy, Clone, Debug, Default, PartialEq)]
-pub struct ClassInput {
-    /// Index of its gesture in the front end; `None` for a pose map that needs none.
-    pub gesture: Option<usize>,
-    /// The gesture is to be performed in the opposite sense.
-    pub reverse: bool,
-    /// The channel that drives it in place of a gesture, by index in the front end.
-    pub channel: Option<(usize, ChannelMap)>,
-    /// Index of its feature in the front end, for a pose map.
-    pub feature: Option<usize>,
-    /// Channels that drive its parameters beside amplitude and frequency, by index in the front end.
-    pub extra: [Option<(usize, ChannelMap)>; EXTRA],
 }
 
 /// A character that is being played: gesture front end, animator, envelope and the stages of a run.

@@ -9,6 +9,7 @@ use super::files::Files;
 use super::gestures::{GestureFiles, Reader, merged};
 use super::layer::{LayerParts, layer_parts};
 use super::motion::{GraphParts, clip, graph_parts, neighbourhoods, read};
+use super::search::{SearchParts, search_parts};
 use super::servos::servo_map;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
@@ -21,10 +22,10 @@ use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
 use crate::motion::mapping::DirectClass;
+use crate::motion::node::ClassInput;
 use crate::motion::node::Node;
 use crate::motion::range::JointRange;
 use crate::pose::PoseHeader;
-use crate::puppet::ClassInput;
 use crate::robot::{Envelope, JointEnvelope, RobotModel};
 
 /// A checked character: everything but the pose stream and the bus.
@@ -71,6 +72,7 @@ pub struct Character {
     /// Pictures per second of the terminal view.
     pub view_hz: f64,
     graph: GraphParts,
+    search: Option<SearchParts>,
     layers: Vec<LayerParts>,
     channels: Vec<ChannelParts>,
     /// Paths of the gesture files, and what stood in them.
@@ -145,6 +147,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         .map_err(|e| at.key("class.name", e))?;
     }
     let graph = graph_parts(&file, &classes, &at)?;
+    let search = search_parts(&file, &classes, &at)?;
     let layers = file
         .layer
         .iter()
@@ -226,6 +229,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         classes,
         end_pose,
         graph,
+        search,
         layers,
         channels,
     };
@@ -273,7 +277,13 @@ impl Character {
         let edges: Vec<_> = edges.iter().map(|(from, to)| (*from, *to, 1.0)).collect();
         let graph = Graph::new(classes.len(), *start, &edges, *options);
         let space = Box::new(self.body.space.clone());
-        let animator = Animator::new(space, classes, graph, layers, &ranges);
+        let mut animator = Animator::new(space, classes, graph, layers, &ranges);
+        if let Some(search) = &self.search {
+            let made = search.make(&self.classes, &self.graph.1, &self.model);
+            for (from, to, search) in made.map_err(|e| wrong("graph.search", None, e))? {
+                animator = animator.with_search(from, to, search);
+            }
+        }
         Ok(match &self.body.feet {
             Some(feet) => animator.with_pinned_feet(Box::new(feet.clone())),
             None => animator,

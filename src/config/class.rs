@@ -12,8 +12,8 @@ use crate::gesture::{FrontEnd, GestureKind, GestureSet};
 use crate::motion::class::{ClassOptions, EXTRA, Example, Play};
 use crate::motion::clip::ClipKind;
 use crate::motion::layer::ChannelMap;
+use crate::motion::node::ClassInput;
 use crate::motion::weights::{Parameters, WeightKind};
-use crate::puppet::ClassInput;
 use crate::robot::JointEnvelope;
 
 /// A class before it is built.

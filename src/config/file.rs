@@ -235,6 +235,28 @@ pub struct GraphEntry {
     pub blend_s: Option<f64>,
     /// Idle time before the start class comes back, seconds.
     pub idle_s: Option<f64>,
+    /// Transitions between classes of clips are chosen at run time, by likeness and latency, in place of a blend.
+    pub search: Option<SearchEntry>,
+}
+
+/// How transitions are chosen.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchEntry {
+    /// Steps that are looked ahead (10).
+    pub depth: Option<usize>,
+    /// Length of a step, as a part of a cycle or path, and of a parameter's range (0.1).
+    pub step: Option<f64>,
+    /// Cost of a frame of latency, at 25 frames a second (5).
+    pub lambda: Option<f64>,
+    /// Cost of a dissimilarity of 1; found from random requests when not given.
+    pub kappa: Option<f64>,
+    /// Least similarity of a transition, 0..1 (0): without one the class is not left.
+    pub s_min: Option<f64>,
+    /// Longest way to a transition, seconds (1).
+    pub latency_s: Option<f64>,
+    /// Edges that it is for, as `["from", "to"]`; all that it can be for when not given.
+    pub edges: Option<Vec<Spanned<[String; 2]>>>,
 }
 
 /// The robot.
