@@ -5,18 +5,24 @@
 //! ([`RootPose`]), which are kept beside them: what is compared and blended does not depend on where
 //! the body went.
 
+pub mod blend;
 mod feet;
 mod joint_space;
+mod robot_ends;
 mod robot_feet;
 mod root;
 mod skeleton;
+mod skeleton_feet;
 mod skeleton_space;
 
+pub use blend::Blending;
 pub use feet::Feet;
 pub use joint_space::{BODY, JointSpace};
+pub use robot_ends::RobotEnds;
 pub use robot_feet::RobotFeet;
 pub use root::{RootAdvance, RootPose};
 pub use skeleton::{Skeleton, SkeletonError, SkeletonJoint};
+pub use skeleton_feet::SkeletonFeet;
 pub use skeleton_space::SkeletonSpace;
 
 use std::ops::Range;

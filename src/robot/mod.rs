@@ -1,13 +1,15 @@
 //! Robot: URDF model, kinematics, legs, envelope.
 //!
 //! [`model`] reads and checks a URDF, [`kinematics`] places its links, [`leg`] finds legs and
-//! solves them, [`envelope`] is the last thing every target passes before it leaves.
+//! solves them, [`ik`] solves any other chain, [`envelope`] is the last thing every target passes before it leaves.
 
 pub mod envelope;
+pub mod ik;
 pub mod kinematics;
 pub mod leg;
 pub mod model;
 
 pub use envelope::{Envelope, JointEnvelope};
+pub use ik::ChainIk;
 pub use leg::Leg;
 pub use model::{JointLimits, ModelError, RobotModel};
