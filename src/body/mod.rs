@@ -76,6 +76,20 @@ pub trait PoseSpace: Send + Sync {
     /// Adds `scale` times a difference to `pose`.
     fn add(&self, pose: &mut [f64], difference: &[f64], scale: f64);
 
+    /// Adds `scale` times the way from pose `from` to pose `to` to `pose`: [`PoseSpace::diff`] and
+    /// [`PoseSpace::add`] in one. `difference` is room for a difference.
+    fn add_way(
+        &self,
+        pose: &mut [f64],
+        from: &[f64],
+        to: &[f64],
+        scale: f64,
+        difference: &mut [f64],
+    ) {
+        self.diff(from, to, difference);
+        self.add(pose, difference, scale);
+    }
+
     /// Euclidean features of a pose in the travelling frame, metres.
     fn embed(&self, pose: &[f64], out: &mut [f64]);
 

@@ -103,8 +103,8 @@ impl Layer {
             return;
         }
         self.clip.pose(weight.abs(), &mut self.pose);
-        space.diff(&self.rest, &self.pose, &mut self.difference);
-        space.add(pose, &self.difference, weight.signum());
+        let (rest, there) = (&self.rest, &self.pose);
+        space.add_way(pose, rest, there, weight.signum(), &mut self.difference);
     }
 }
 
