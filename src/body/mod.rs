@@ -14,6 +14,7 @@ mod root;
 mod skeleton;
 mod skeleton_feet;
 mod skeleton_space;
+mod skin;
 
 pub use blend::Blending;
 pub use feet::Feet;
@@ -24,6 +25,7 @@ pub use root::{RootAdvance, RootPose};
 pub use skeleton::{Skeleton, SkeletonError, SkeletonJoint};
 pub use skeleton_feet::SkeletonFeet;
 pub use skeleton_space::SkeletonSpace;
+pub use skin::{Influence, SkinBone, SkinError, SkinnedMesh};
 
 use std::ops::Range;
 

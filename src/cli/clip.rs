@@ -1,4 +1,8 @@
-//! `handwave clip`: author gaits for a legged URDF; look into a clip.
+//! `handwave clip`: bring motion in and out; author gaits for a legged URDF; look into a clip.
+
+mod export;
+mod import;
+mod source;
 
 use super::{ExitStatus, Failure, say, warn};
 use crate::motion::clip::{ClipFile, ClipKind};
@@ -18,6 +22,12 @@ pub struct ClipArgs {
 
 #[derive(Subcommand, Debug)]
 enum ClipCommand {
+    /// Bring a motion of another program in: glTF, BVH, AMC, joint-space JSON and CSV
+    #[command(after_help = import::EXAMPLES)]
+    Import(Box<import::ImportArgs>),
+    /// Write a clip for other programs: BVH, CSV, glTF
+    #[command(after_help = export::EXAMPLES)]
+    Export(Box<export::ExportArgs>),
     /// Turn a gait description and a URDF with legs into a joint-space clip
     #[command(after_help = "Examples:
   handwave clip gait --urdf dog.urdf --gait trot --out trot.json
@@ -84,6 +94,8 @@ struct GaitArgs {
 /// Runs `handwave clip ...`.
 pub fn run(args: &ClipArgs) -> Result<ExitStatus, Failure> {
     match &args.command {
+        ClipCommand::Import(args) => import::run(args),
+        ClipCommand::Export(args) => export::run(args),
         ClipCommand::Gait(args) => gait(args),
         ClipCommand::Info { file, json } => info(file, *json),
     }

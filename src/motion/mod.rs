@@ -7,9 +7,11 @@
 pub mod animator;
 pub mod class;
 pub mod clip;
+pub mod export;
 pub mod gait;
 pub mod gait_frames;
 pub mod graph;
+pub mod import;
 pub mod layer;
 mod limbs;
 pub mod mapping;

@@ -137,29 +137,42 @@ impl ClipFile {
         Ok(file)
     }
 
-    /// JSON text, one line per frame, numbers rounded to a micro-radian.
+    /// JSON text, one line per frame, numbers rounded to a micro-radian and a micrometre.
     pub fn to_json(&self) -> String {
         let round = |v: f64| (v * 1e6).round() / 1e6 + 0.0;
         let mut head = self.clone();
-        head.frames.clear();
-        let mut text = serde_json::to_string_pretty(&head).unwrap_or_default();
-        let rows: Vec<String> = self
-            .frames
-            .iter()
-            .map(|f| {
-                let numbers: Vec<f64> = f.iter().map(|v| round(*v)).collect();
-                format!(
-                    "    {}",
-                    serde_json::to_string(&numbers).unwrap_or_default()
-                )
-            })
-            .collect();
-        text = text.replace(
-            "\"frames\": []",
-            &format!("\"frames\": [\n{}\n  ]", rows.join(",\n")),
-        );
-        text.push('\n');
-        text
+        let rows = |rows: Vec<&[f64]>| {
+            let lines = rows.into_iter().map(|row| {
+                let numbers: Vec<f64> = row.iter().map(|v| round(*v)).collect();
+                let line = serde_json::to_string(&numbers).unwrap_or_default();
+                format!("    {line}")
+            });
+            lines.collect::<Vec<_>>().join(",\n")
+        };
+        // The head keeps one row of each table, which says where the table goes.
+        let tables = [
+            ("body", rows(self.body.iter().map(|r| &r[..]).collect())),
+            ("way", rows(self.way.iter().map(|r| &r[..]).collect())),
+            ("frames", rows(self.frames.iter().map(|r| &r[..]).collect())),
+        ];
+        head.body.truncate(1);
+        head.body.iter_mut().for_each(|r| *r = [0.0; 6]);
+        head.way.truncate(1);
+        head.way.iter_mut().for_each(|r| *r = [0.0; 3]);
+        head.frames = vec![Vec::new()];
+        let mut value = serde_json::to_string_pretty(&head).unwrap_or_default();
+        for (key, rows) in tables {
+            // Keys of the top level are indented by two; only they can be meant.
+            let Some(start) = value.find(&format!("\n  \"{key}\": [")) else {
+                continue;
+            };
+            let end = value[start..].find("\n  ]").map(|e| start + e);
+            if let Some(end) = end {
+                value.replace_range(start..end + 4, &format!("\n  \"{key}\": [\n{rows}\n  ]"));
+            }
+        }
+        value.push('\n');
+        value
     }
 
     fn check(&self) -> Result<(), ClipError> {
