@@ -133,9 +133,8 @@ impl Blend {
         self.space.blend(&self.poses, &self.weights, &mut self.out);
         for layer in &self.layers {
             layer.pose(0.5, &mut self.layer);
-            self.space
-                .diff(&self.rest, &self.layer, &mut self.difference);
-            self.space.add(&mut self.out, &self.difference, 1.0);
+            let room = &mut self.difference;
+            self.space.add_way(&mut self.out, &self.rest, &self.layer, 1.0, room);
         }
     }
 }
