@@ -134,7 +134,8 @@ impl Blend {
         for layer in &self.layers {
             layer.pose(0.5, &mut self.layer);
             let room = &mut self.difference;
-            self.space.add_way(&mut self.out, &self.rest, &self.layer, 1.0, room);
+            self.space
+                .add_way(&mut self.out, &self.rest, &self.layer, 1.0, room);
         }
     }
 }

@@ -7,7 +7,8 @@ mod gaps;
 
 use crate::base::{JointState, Time};
 use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
-use crate::motion::class::Drive;
+use crate::motion::class::{Drive, EXTRA};
+use crate::motion::layer::{ChannelMap, LayerInput};
 use crate::motion::mapping::Seen;
 use crate::motion::{Animator, ease};
 use crate::pose::PoseSample;
@@ -90,12 +91,14 @@ pub struct Targets {
 }
 
 /// What drives a class.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
 pub struct ClassInput {
     /// Index of its gesture in the front end; `None` for a pose map that needs none.
     pub gesture: Option<usize>,
     /// Index of its feature in the front end, for a pose map.
     pub feature: Option<usize>,
+    /// Channels that drive its parameters beside amplitude and frequency, by index in the front end.
+    pub extra: [Option<(usize, ChannelMap)>; EXTRA],
 }
 
 /// A character that is being played: gesture front end, animator, envelope and the stages of a run.
@@ -104,6 +107,8 @@ pub struct Puppet {
     animator: Animator,
     envelope: Envelope,
     class_inputs: Vec<ClassInput>,
+    /// Joint positions where a run ends. The pose's first coordinates are the joints; what follows (the
+    /// body over the ground) is the animator's alone.
     end_pose: Vec<f64>,
     options: PuppetOptions,
     stage: Stage,
@@ -116,6 +121,8 @@ pub struct Puppet {
     rejected: u64,
     estimates: Vec<GestureEstimate>,
     drives: Vec<Drive>,
+    /// Gestures as layers see them.
+    waves: Vec<Drive>,
     channels: Vec<f64>,
     pose: Vec<f64>,
     last_pose: Vec<f64>,
@@ -173,12 +180,13 @@ impl Puppet {
         end_pose: Vec<f64>,
         options: PuppetOptions,
     ) -> Self {
-        let joints = animator.coordinates();
+        let (joints, coordinates) = (end_pose.len(), animator.coordinates());
         let estimates = front.estimates().to_vec();
         let channels = vec![f64::NAN; front.channel_names().len()];
         Self {
             joins: vec![Join::default(); class_inputs.len()],
             drives: vec![Drive::default(); class_inputs.len()],
+            waves: vec![Drive::default(); estimates.len()],
             estimates,
             channels,
             front,
@@ -197,8 +205,8 @@ impl Puppet {
             playing_since: None,
             tempo: Tempo::default(),
             rejected: 0,
-            pose: vec![0.0; joints],
-            last_pose: vec![0.0; joints],
+            pose: vec![0.0; coordinates],
+            last_pose: vec![0.0; coordinates],
             still_s: 0.0,
             targets: Targets {
                 positions: vec![0.0; joints],
@@ -213,7 +221,8 @@ impl Puppet {
         self.targets.positions.copy_from_slice(present);
         self.animator.rest_pose(&mut self.pose);
         self.last_pose.copy_from_slice(&self.pose);
-        self.ramp.to.copy_from_slice(&self.pose);
+        let joints = self.end_pose.len();
+        self.ramp.to.copy_from_slice(&self.pose[..joints]);
         self.start_ramp(self.options.ramp_s);
         self.enter(Stage::Rising, now);
     }
@@ -259,9 +268,11 @@ impl Puppet {
                     self.enter(Stage::Done, now);
                 }
             }
-            Stage::Done => self.pose.copy_from_slice(&self.end_pose),
+            Stage::Done => self.pose[..self.end_pose.len()].copy_from_slice(&self.end_pose),
         }
-        self.targets.held_back = self.envelope.pass(&self.pose, &mut self.targets.positions);
+        let joints = self.end_pose.len();
+        self.targets.held_back =
+            (self.envelope).pass(&self.pose[..joints], &mut self.targets.positions);
         self.targets.stage = self.stage;
         &self.targets
     }
@@ -325,7 +336,8 @@ impl Puppet {
             }
             let drive = &mut self.drives[class];
             let Some(gesture) = input.gesture else {
-                drive.amplitude = share;
+                // Played while nothing else is: it asks for nothing.
+                drive.amplitude = 0.0;
                 continue;
             };
             let estimate = &self.estimates[gesture];
@@ -338,17 +350,23 @@ impl Puppet {
                 amplitude: estimate.amplitude * share,
                 frequency_hz,
                 phase_rad,
+                extra: [0.0; EXTRA],
             };
         }
-        for (index, value) in self.channels.iter_mut().enumerate() {
-            *value = if share > 0.0 {
-                self.front.channel(index)
-            } else {
-                f64::NAN
-            };
+        self.read_channels(share);
+        for (drive, input) in self.drives.iter_mut().zip(&self.class_inputs) {
+            for (value, source) in drive.extra.iter_mut().zip(&input.extra) {
+                *value = source.map_or(0.0, |(channel, map)| {
+                    map.weight(self.channels.get(channel).copied().unwrap_or(f64::NAN))
+                });
+            }
         }
+        let input = LayerInput {
+            channels: &self.channels,
+            gestures: &self.waves,
+        };
         self.animator
-            .step(&self.drives, &self.channels, dt_s, &mut self.pose);
+            .step(&self.drives, &input, dt_s, &mut self.pose);
         let fastest = self
             .pose
             .iter()
@@ -361,6 +379,26 @@ impl Puppet {
             0.0
         };
         self.last_pose.copy_from_slice(&self.pose);
+    }
+
+    /// Channels, and gestures as layers see them; with `share` 0 all are released.
+    fn read_channels(&mut self, share: f64) {
+        for (index, value) in self.channels.iter_mut().enumerate() {
+            *value = if share > 0.0 {
+                self.front.channel(index)
+            } else {
+                f64::NAN
+            };
+        }
+        // Gestures that are learnt while a run goes on drive no layer, and find no room here.
+        for (wave, estimate) in self.waves.iter_mut().zip(&self.estimates) {
+            *wave = Drive {
+                amplitude: estimate.amplitude * share,
+                frequency_hz: estimate.frequency_hz,
+                phase_rad: estimate.phase_rad,
+                extra: [0.0; EXTRA],
+            };
+        }
     }
 
     fn lower(&mut self, now: Time) {

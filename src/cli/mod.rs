@@ -1,9 +1,11 @@
 //! The command line: one file per command, exit codes, messages.
 
 pub mod bus;
+pub mod character;
 pub mod clip;
 mod failure;
 pub mod gesture;
+mod legged;
 pub mod map;
 pub mod poses;
 pub mod run;
@@ -39,6 +41,8 @@ enum Command {
     Poses(poses::PosesArgs),
     /// Bring motion in; author gaits for a legged robot
     Clip(clip::ClipArgs),
+    /// Make a whole character, ready to run, from the URDF of a legged robot
+    Character(character::CharacterArgs),
     /// Pose mapping: the performer's pose itself drives a body; suggest, learn, apply, study
     Map(map::MapArgs),
     /// Look at and set up servos on a bus
@@ -56,6 +60,7 @@ pub fn main() -> ExitCode {
         Some(Command::Gesture(args)) => gesture::run(args),
         Some(Command::Poses(args)) => poses::run(args),
         Some(Command::Clip(args)) => clip::run(&args),
+        Some(Command::Character(args)) => character::run(&args),
         Some(Command::Map(args)) => map::run(args),
         Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),

@@ -1,28 +1,25 @@
 //! From a configuration to checked parts: every file read, every name resolved, every number in range.
 
+use super::body::Body;
 use super::channel::{self, ChannelParts, channel_parts};
 use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
 use super::gestures::{GestureFiles, Reader, merged};
-use super::motion::{
-    ClassParts, GraphParts, LayerParts, class_parts, clip, graph_parts, layer_parts,
-    neighbourhoods, read,
-};
+use super::layer::{LayerParts, channel_index, layer_parts};
+use super::motion::{ClassParts, GraphParts, class_parts, clip, graph_parts, neighbourhoods, read};
 use super::servos::servo_map;
-use crate::base::suggest::hint;
-use crate::body::JointSpace;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{
     EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet, PerformerScale,
 };
 use crate::motion::Animator;
-use crate::motion::class::MotionClass;
+use crate::motion::class::{EXTRA, MotionClass};
 use crate::motion::clip::ClipKind;
 use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
-use crate::motion::layer::Layer;
+use crate::motion::layer::ChannelMap;
 use crate::motion::mapping::DirectClass;
 use crate::motion::node::Node;
 use crate::motion::range::JointRange;
@@ -42,6 +39,8 @@ pub struct Character {
     pub source: String,
     /// The robot.
     pub model: RobotModel,
+    /// Its poses and feet.
+    pub body: Body,
     /// Joint names in model order.
     pub joints: Vec<String>,
     /// Servos in model order.
@@ -112,11 +111,12 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let model = RobotModel::from_urdf(&read(&files, &file.robot.urdf, "robot.urdf", &at)?)
         .map_err(|e| at.at(file.robot.urdf.span(), "robot.urdf", e))?;
     let joints = model.joint_names();
+    let body = Body::new(&model, &file.robot, &at)?;
     let limits = envelope_limits(&file, &model);
     let servos = servo_map(&file, &model, &at)?;
     let ranges = joint_ranges(&limits);
     let (mut gestures, paths, texts) = gesture_set(&files, &file, &at)?;
-    let classes = class_parts(&files, &file, &joints, &limits, &gestures, &at)?;
+    let classes = class_parts(&files, &file, &body, &joints, &limits, &gestures, &at)?;
     if let (true, Some(map)) = (
         gestures.gestures.is_empty(),
         classes.iter().find_map(|c| c.map.as_ref()),
@@ -135,19 +135,24 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
                 ));
             }
         }
-        MotionClass::new(&class.name, class.examples.clone(), ranges.clone())
-            .map_err(|e| at.key("class.name", e))?;
+        MotionClass::new(
+            &class.name,
+            class.examples.clone(),
+            ranges.clone(),
+            class.options.clone(),
+        )
+        .map_err(|e| at.key("class.name", e))?;
     }
     let graph = graph_parts(&file, &classes, &at)?;
     let layers = file
         .layer
         .iter()
-        .map(|entry| layer_parts(&files, entry, &joints, &at))
+        .map(|entry| layer_parts(&files, entry, &body, &gestures, &at))
         .collect::<Result<_, _>>()?;
     let channels = channel_parts(&file, &at)?;
     let end_pose = match &file.safety.end_clip {
         Some(path) => {
-            let clip = clip(&files, path, "safety.end_clip", &joints, &at)?;
+            let clip = clip(&files, path, "safety.end_clip", &body, &at)?;
             if clip.kind != ClipKind::Path {
                 let problem = format!(
                     "clip {} is a cycle; the end pose is the end of a path",
@@ -159,8 +164,9 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
                 let problem = format!("clip {}: {problem}", clip.name);
                 return Err(at.at(path.span(), "safety.end_clip", problem));
             }
-            let mut pose = vec![0.0; joints.len()];
+            let mut pose = vec![0.0; clip.coordinates()];
             clip.pose(1.0, &mut pose);
+            pose.truncate(joints.len());
             Some(pose)
         }
         None => None,
@@ -211,6 +217,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         view_hz: file.view.refresh_hz,
         files,
         model,
+        body,
         joints,
         servos,
         gestures,
@@ -250,45 +257,49 @@ impl Character {
                     let (map, always) = (parts.map.clone(), c.gesture.is_none());
                     Ok(DirectClass::new(&c.name, map, ranges.clone(), always).into())
                 }
-                None => MotionClass::new(&c.name, c.examples.clone(), ranges.clone())
-                    .map(Node::from)
-                    .map_err(|e| wrong("class", None, e.to_string())),
+                None => {
+                    let (examples, options) = (c.examples.clone(), c.options.clone());
+                    MotionClass::new(&c.name, examples, ranges.clone(), options)
+                        .map(Node::from)
+                        .map_err(|e| wrong("class", None, e.to_string()))
+                }
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let mut layers = Vec::new();
-        for parts in &self.layers {
-            let channel = front.channel_index(&parts.channel).ok_or_else(|| {
-                let names = front.channel_names();
-                let hint = hint(&parts.channel, front.channel_aliases());
-                wrong(
-                    "layer.channel",
-                    Some(parts.line),
-                    format!(
-                        "layer {}: the pose stream has no channel {:?}{hint} It has: {}",
-                        parts.name,
-                        parts.channel,
-                        names.join(", ")
-                    ),
-                )
-            })?;
-            let layer = Layer::new(&parts.name, channel, parts.map, parts.clip.clone(), &ranges)
-                .ok_or_else(|| {
-                    wrong(
-                        "layer.clip",
-                        Some(parts.line),
-                        format!("layer {}: a layer needs a path, not a cycle", parts.name),
-                    )
-                })?;
-            layers.push(layer);
-        }
+        let layers = (self.layers.iter())
+            .map(|parts| parts.bind(front, &self.body, &ranges, &self.config_name))
+            .collect::<Result<_, _>>()?;
         let (start, edges, options) = &self.graph;
-        let graph = Graph::new(classes.len(), *start, edges, *options);
-        Ok(Animator::new(
-            Box::new(JointSpace::of_robot(&self.model, false)),
-            classes,
-            graph,
-            layers,
-        ))
+        let edges: Vec<_> = edges.iter().map(|(from, to)| (*from, *to, 1.0)).collect();
+        let graph = Graph::new(classes.len(), *start, &edges, *options);
+        let space = Box::new(self.body.space.clone());
+        let animator = Animator::new(space, classes, graph, layers, &ranges);
+        Ok(match &self.body.feet {
+            Some(feet) => animator.with_pinned_feet(Box::new(feet.clone())),
+            None => animator,
+        })
+    }
+
+    /// Per class the channels that drive its parameters beside amplitude and frequency.
+    pub fn extra_channels(
+        &self,
+        front: &FrontEnd,
+    ) -> Result<Vec<[Option<(usize, ChannelMap)>; EXTRA]>, ConfigError> {
+        (self.classes.iter())
+            .map(|class| {
+                let mut bound = [None; EXTRA];
+                for (slot, parts) in bound.iter_mut().zip(&class.extra) {
+                    let channel =
+                        channel_index(front, &parts.channel).map_err(|e| ConfigError {
+                            file: self.config_name.clone(),
+                            line: Some(parts.line),
+                            key: "class.parameter.channel".into(),
+                            problem: format!("class {}: {e}", class.name),
+                        })?;
+                    *slot = Some((channel, parts.map));
+                }
+                Ok(bound)
+            })
+            .collect()
     }
 
     /// Features of the pose maps, one per class that has one, in node order.

@@ -80,6 +80,37 @@ pub struct ClassEntry {
     pub clip: Vec<ClipEntry>,
     /// Instead of clips, path of a pose map: the pose itself drives the body.
     pub map: Option<Spanned<String>>,
+    /// What moves it along: `gesture` (phase or progression), `once` (the clock, whenever the gesture is
+    /// performed anew) or `loop` (the clock, round and round).
+    pub play: Option<Spanned<String>>,
+    /// Windows of phase or progression, 0 to 1, in which it may be left; at any time when not given.
+    #[serde(default)]
+    pub leave: Vec<[f64; 2]>,
+    /// Part of the phase advance that a limb may gain or lose against the body; 0.05 when not given.
+    pub limb_advance: Option<f64>,
+    /// How parameters become weights.
+    pub weights: Option<Spanned<String>>,
+    /// Parameters beside amplitude and frequency.
+    #[serde(default)]
+    pub parameter: Vec<ParameterEntry>,
+}
+
+/// A parameter of a class that a channel drives.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterEntry {
+    /// Its name, as clips give it in `at`.
+    pub name: Spanned<String>,
+    /// The channel that drives it.
+    pub channel: Spanned<String>,
+    /// Channel values at -1 (or 0 when `one_sided`) and at 1.
+    pub range: Spanned<[f64; 2]>,
+    /// The parameter runs from 0 to 1 instead of -1 to +1.
+    #[serde(default)]
+    pub one_sided: bool,
+    /// Part of the range that counts as nothing.
+    #[serde(default)]
+    pub dead_zone: f64,
 }
 
 /// An example clip of a class.
@@ -94,6 +125,9 @@ pub struct ClipEntry {
     /// Gesture frequency at which it is played pure, Hz.
     #[serde(default)]
     pub frequency_hz: f64,
+    /// Its further parameters, by name; 0 when not given.
+    #[serde(default)]
+    pub at: BTreeMap<String, f64>,
 }
 
 /// A channel mixed from those of the pose stream: `offset` plus every channel times its weight,
@@ -138,13 +172,25 @@ pub struct ChannelEntry {
 #[serde(deny_unknown_fields)]
 pub struct LayerEntry {
     /// Layer name.
-    pub name: String,
+    pub name: Spanned<String>,
     /// The channel that drives it.
-    pub channel: Spanned<String>,
-    /// Path of the clip whose end is weight 1.
+    pub channel: Option<Spanned<String>>,
+    /// Or the gesture that does: its amplitude or progression, and for a cycle its phase.
+    pub gesture: Option<Spanned<String>>,
+    /// Or the clock: a cycle goes round by itself (breathing).
+    #[serde(default)]
+    pub clock: bool,
+    /// Path of the clip: the end of a path is weight 1; a cycle is scaled by the weight.
     pub clip: Spanned<String>,
     /// Channel values at the lowest and the highest weight.
-    pub range: Spanned<[f64; 2]>,
+    pub range: Option<Spanned<[f64; 2]>>,
+    /// Joints that it may move; all when not given. `body` is the body over the ground.
+    pub joints: Option<Vec<String>>,
+    /// Cycles a second of a cycle that no gesture drives; as the clip was made when not given.
+    pub frequency_hz: Option<f64>,
+    /// Only while no gesture is performed.
+    #[serde(default)]
+    pub idle_only: bool,
     /// Weight runs from 0 to 1 instead of -1 to +1.
     #[serde(default)]
     pub one_sided: bool,
@@ -184,6 +230,12 @@ pub struct RobotEntry {
     /// Share of the URDF's velocity limits to use.
     #[serde(default = "one")]
     pub velocity_share: f64,
+    /// Foot link of each leg, by leg name; found in the URDF when not given.
+    #[serde(default)]
+    pub legs: BTreeMap<String, String>,
+    /// Feet stay where they stand while the motion has them on the ground.
+    #[serde(default = "yes")]
+    pub pin_feet: bool,
     /// Joint to servo.
     pub joint: Vec<JointEntry>,
 }
@@ -329,6 +381,9 @@ impl Default for ViewEntry {
 
 fn one() -> f64 {
     1.0
+}
+fn yes() -> bool {
+    true
 }
 fn two() -> f64 {
     2.0

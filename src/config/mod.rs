@@ -3,15 +3,18 @@
 //! [`mod@file`] is what a user writes, [`files`] where its parts are read from (a folder, or those
 //! embedded in the program), [`build`] checks it and makes the parts, [`map`] learns the pose maps it names, [`error`] tells what is wrong.
 
+pub mod body;
 pub mod build;
 mod channel;
 pub mod error;
 pub mod file;
 pub mod files;
 mod gestures;
+mod layer;
 pub mod map;
 mod motion;
 mod servos;
+pub mod starter;
 
 pub use build::{Character, load};
 pub use error::ConfigError;

@@ -1,15 +1,18 @@
 //! Classes, graph and layers of a configuration, checked and resolved to indices.
 
+use super::body::Body;
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, ClassEntry, LayerEntry};
+use super::file::{CharacterFile, ClassEntry, ClipEntry};
 use super::files::Files;
+use super::layer::channel_map;
 use super::map::{MapParts, load_map};
 use crate::base::suggest::hint;
 use crate::gesture::{GestureKind, GestureSet};
-use crate::motion::class::Example;
+use crate::motion::class::{ClassOptions, EXTRA, Example, Play};
 use crate::motion::clip::{Clip, ClipFile, ClipKind};
 use crate::motion::graph::GraphOptions;
 use crate::motion::layer::ChannelMap;
+use crate::motion::weights::{Parameters, WeightKind};
 use crate::robot::JointEnvelope;
 use std::ops::Range;
 
@@ -22,7 +25,20 @@ pub struct ClassParts {
     pub gesture: Option<usize>,
     /// The pose map, in place of clips.
     pub map: Option<MapParts>,
+    /// How it is played.
+    pub options: ClassOptions,
+    /// Channels that drive its parameters beside amplitude and frequency.
+    pub(super) extra: Vec<ExtraParts>,
     pub(super) examples: Vec<Example>,
+}
+
+/// A parameter of a class beside amplitude and frequency, not yet bound to its channel.
+#[derive(Clone, Debug)]
+pub(super) struct ExtraParts {
+    pub(super) channel: String,
+    pub(super) map: ChannelMap,
+    /// Line in the configuration, for messages.
+    pub(super) line: usize,
 }
 
 impl ClassParts {
@@ -30,16 +46,6 @@ impl ClassParts {
     pub fn clip_names(&self) -> Vec<String> {
         self.examples.iter().map(|e| e.clip.name.clone()).collect()
     }
-}
-
-#[derive(Clone, Debug)]
-pub(super) struct LayerParts {
-    pub(super) name: String,
-    pub(super) channel: String,
-    /// Line of the channel in the configuration, for messages.
-    pub(super) line: usize,
-    pub(super) map: ChannelMap,
-    pub(super) clip: Clip,
 }
 
 /// Text of the file that `path` names.
@@ -54,17 +60,17 @@ pub(super) fn read(
         .map_err(|e| at.at(path.span(), key, e))
 }
 
-/// The clip that `path` names, in the order of `joints`.
+/// The clip that `path` names, for `body`.
 pub(super) fn clip(
     files: &Files,
     path: &toml::Spanned<String>,
     key: &str,
-    joints: &[String],
+    body: &Body,
     at: &Pointer<'_>,
 ) -> Result<Clip, ConfigError> {
     let text = read(files, path, key, at)?;
     ClipFile::from_json(&text)
-        .and_then(|f| f.for_body(joints))
+        .and_then(|f| body.clip(&f))
         .map_err(|e| {
             at.at(
                 path.span(),
@@ -78,6 +84,7 @@ pub(super) fn clip(
 pub(super) fn class_parts(
     files: &Files,
     file: &CharacterFile,
+    body: &Body,
     joints: &[String],
     limits: &[JointEnvelope],
     gestures: &GestureSet,
@@ -96,21 +103,24 @@ pub(super) fn class_parts(
                 format!("{name:?} is used twice"),
             ));
         }
-        let gesture = gesture_index(class, gestures, at)?;
+        let gesture = (class.gesture.as_ref())
+            .map(|entry| gesture_named(entry, "class.gesture", gestures, at))
+            .transpose()?;
         if let Some(path) = &class.map {
             parts.push(direct_parts(
                 files, file, class, path, joints, limits, gesture, at,
             )?);
             continue;
         }
-        let (Some(gesture), Some(wanted)) = (gesture, &class.gesture) else {
+        let play = play(class, at)?;
+        let Some(gesture) = gesture.or((play == Play::Loop).then_some(NO_GESTURE)) else {
             return Err(at.at(
                 class.name.span(),
                 "class.gesture",
-                "a class of clips needs a gesture that drives it; only a class with `map` may be without",
+                "a class of clips needs a gesture that drives it; only one with `map`, or with play = \"loop\", may be without",
             ));
         };
-        let wanted = wanted.get_ref();
+        let gesture = (gesture != NO_GESTURE).then_some(gesture);
         if class.clip.is_empty() {
             return Err(at.at(
                 class.name.span(),
@@ -118,6 +128,7 @@ pub(super) fn class_parts(
                 "neither clips nor a map; give clip = [{ file = ... }] or map = \"maps/NAME.toml\"",
             ));
         }
+        let (extra, names) = extra_parts(class, at)?;
         let mut examples = Vec::new();
         for entry in &class.clip {
             let in_range = (0.0..=10.0).contains(&entry.amplitude)
@@ -132,7 +143,7 @@ pub(super) fn class_parts(
                     ),
                 ));
             }
-            let clip = clip(files, &entry.file, "class.clip.file", joints, at)?;
+            let clip = clip(files, &entry.file, "class.clip.file", body, at)?;
             if clip.kind == ClipKind::Cycle && entry.amplitude > 0.0 && entry.frequency_hz <= 0.0 {
                 return Err(at.at(
                     entry.file.span(),
@@ -143,27 +154,32 @@ pub(super) fn class_parts(
                     ),
                 ));
             }
-            let repeats = gestures.gestures[gesture].kind == GestureKind::Cyclic;
-            if repeats != (clip.kind == ClipKind::Cycle) {
-                return Err(at.at(
-                    entry.file.span(),
-                    "class.clip",
-                    format!(
-                        "clip {} is a {}, gesture {wanted:?} is {}; cyclic gestures drive cycles, non-cyclic ones paths",
-                        clip.name,
-                        if clip.kind == ClipKind::Cycle { "cycle" } else { "path" },
-                        gestures.gestures[gesture].kind.name(),
-                    ),
-                ));
+            if let (Some(gesture), Play::Gesture) = (gesture, play) {
+                let gesture = &gestures.gestures[gesture];
+                if (gesture.kind == GestureKind::Cyclic) != (clip.kind == ClipKind::Cycle) {
+                    let kind = if clip.kind == ClipKind::Cycle {
+                        "cycle"
+                    } else {
+                        "path"
+                    };
+                    return Err(at.at(
+                        entry.file.span(),
+                        "class.clip",
+                        format!(
+                            "clip {} is a {kind}, gesture {:?} is {}; cyclic gestures drive cycles, non-cyclic ones paths (or play = \"once\": the clock drives it)",
+                            clip.name, gesture.name, gesture.kind.name(),
+                        ),
+                    ));
+                }
             }
             examples.push(Example {
                 clip,
-                parameters: [entry.amplitude, entry.frequency_hz],
+                parameters: parameters(entry, &names, at)?,
             });
         }
         let at_rest = examples.iter().filter(|e| e.parameters[0] == 0.0).count();
         let cyclic = examples.iter().any(|e| e.clip.kind == ClipKind::Cycle);
-        if cyclic && at_rest != 1 {
+        if cyclic && play == Play::Gesture && at_rest != 1 {
             return Err(at.at(
                 class.name.span(),
                 "class.clip",
@@ -174,35 +190,127 @@ pub(super) fn class_parts(
         }
         parts.push(ClassParts {
             name: name.clone(),
-            gesture: Some(gesture),
+            gesture,
             map: None,
+            options: ClassOptions {
+                play,
+                leave: class.leave.clone(),
+                limb_advance: class
+                    .limb_advance
+                    .unwrap_or(ClassOptions::default().limb_advance),
+                weights: weights(class, at)?,
+                extra: names,
+            },
+            extra,
             examples,
         });
     }
     Ok(parts)
 }
 
-/// Index of the gesture that a class names.
-fn gesture_index(
+/// Stands for the gesture of a class that needs none.
+const NO_GESTURE: usize = usize::MAX;
+
+/// What moves a class along.
+fn play(class: &ClassEntry, at: &Pointer<'_>) -> Result<Play, ConfigError> {
+    let Some(play) = &class.play else {
+        return Ok(Play::Gesture);
+    };
+    Ok(match play.get_ref().as_str() {
+        "gesture" => Play::Gesture,
+        "once" => Play::Once,
+        "loop" => Play::Loop,
+        other => {
+            let problem = format!("unknown {other:?}. Allowed: gesture, once, loop");
+            return Err(at.at(play.span(), "class.play", problem));
+        }
+    })
+}
+
+/// How a class turns parameters into weights.
+fn weights(class: &ClassEntry, at: &Pointer<'_>) -> Result<WeightKind, ConfigError> {
+    let Some(name) = &class.weights else {
+        return Ok(WeightKind::default());
+    };
+    WeightKind::by_name(name.get_ref()).ok_or_else(|| {
+        let problem = format!(
+            "unknown {:?}. Allowed: {}",
+            name.get_ref(),
+            WeightKind::NAMES.join(", ")
+        );
+        at.at(name.span(), "class.weights", problem)
+    })
+}
+
+/// A class's parameters beside amplitude and frequency, and their names.
+fn extra_parts(
     class: &ClassEntry,
+    at: &Pointer<'_>,
+) -> Result<(Vec<ExtraParts>, Vec<String>), ConfigError> {
+    let (mut parts, mut names) = (Vec::new(), Vec::new());
+    for entry in &class.parameter {
+        let name = entry.name.get_ref();
+        let taken = ["amplitude", "frequency_hz"].contains(&name.as_str()) || names.contains(name);
+        if taken || names.len() == EXTRA {
+            let problem = format!(
+                "{name:?} cannot be added: a class has amplitude, frequency_hz and at most {EXTRA} parameters of other names"
+            );
+            return Err(at.at(entry.name.span(), "class.parameter", problem));
+        }
+        parts.push(ExtraParts {
+            channel: entry.channel.get_ref().clone(),
+            map: channel_map(
+                &entry.range,
+                entry.one_sided,
+                entry.dead_zone,
+                "class.parameter",
+                at,
+            )?,
+            line: at.line_of(entry.channel.span().start),
+        });
+        names.push(name.clone());
+    }
+    Ok((parts, names))
+}
+
+/// Parameters at which a clip is played pure.
+fn parameters(
+    entry: &ClipEntry,
+    names: &[String],
+    at: &Pointer<'_>,
+) -> Result<Parameters, ConfigError> {
+    let mut values = vec![entry.amplitude, entry.frequency_hz];
+    for name in names {
+        let value = entry.at.get(name).copied().unwrap_or(0.0);
+        if !(-10.0..=10.0).contains(&value) {
+            let problem = format!("{name} = {value} is not in -10..10");
+            return Err(at.at(entry.file.span(), "class.clip.at", problem));
+        }
+        values.push(value);
+    }
+    if let Some(strange) = entry.at.keys().find(|k| !names.contains(k)) {
+        let hint = hint(strange, names.iter().map(String::as_str));
+        let problem = format!("no parameter {strange:?}{hint} Name it in class.parameter first");
+        return Err(at.at(entry.file.span(), "class.clip.at", problem));
+    }
+    Ok(Parameters::from_slice(&values).unwrap_or_default())
+}
+
+/// Index of the gesture that `entry` names.
+pub(super) fn gesture_named(
+    entry: &toml::Spanned<String>,
+    key: &str,
     gestures: &GestureSet,
     at: &Pointer<'_>,
-) -> Result<Option<usize>, ConfigError> {
-    let Some(entry) = &class.gesture else {
-        return Ok(None);
-    };
+) -> Result<usize, ConfigError> {
     let wanted = entry.get_ref();
     let names = || gestures.gestures.iter().map(|g| g.name.as_str());
-    let found = names().position(|g| g == wanted).ok_or_else(|| {
+    names().position(|g| g == wanted).ok_or_else(|| {
         let hint = hint(wanted, names());
         let all: Vec<&str> = names().collect();
-        at.at(
-            entry.span(),
-            "class.gesture",
-            format!("no gesture {wanted:?}{hint} Gestures: {}", all.join(", ")),
-        )
-    })?;
-    Ok(Some(found))
+        let problem = format!("no gesture {wanted:?}{hint} Gestures: {}", all.join(", "));
+        at.at(entry.span(), key, problem)
+    })
 }
 
 /// A class that maps poses.
@@ -239,6 +347,8 @@ fn direct_parts(
         name: name.clone(),
         gesture,
         map: Some(map),
+        options: ClassOptions::default(),
+        extra: Vec::new(),
         examples: Vec::new(),
     })
 }
@@ -343,50 +453,6 @@ pub(super) fn neighbourhoods(
     (0..classes.len()).map(around).collect()
 }
 
-/// A layer, not yet bound to its channel.
-pub(super) fn layer_parts(
-    files: &Files,
-    entry: &LayerEntry,
-    joints: &[String],
-    at: &Pointer<'_>,
-) -> Result<LayerParts, ConfigError> {
-    let [low, high] = *entry.range.get_ref();
-    if !(low.is_finite() && high.is_finite() && low != high) {
-        return Err(at.at(
-            entry.range.span(),
-            "layer.range",
-            format!("[{low}, {high}] must be two different finite numbers"),
-        ));
-    }
-    if !(0.0..=0.9).contains(&entry.dead_zone) {
-        return Err(at.at(
-            entry.range.span(),
-            "layer.dead_zone",
-            format!("{} is not in 0..0.9", entry.dead_zone),
-        ));
-    }
-    let clip = clip(files, &entry.clip, "layer.clip", joints, at)?;
-    if clip.kind != ClipKind::Path {
-        return Err(at.at(
-            entry.clip.span(),
-            "layer.clip",
-            format!("clip {} is a cycle; a layer needs a path", clip.name),
-        ));
-    }
-    Ok(LayerParts {
-        name: entry.name.clone(),
-        channel: entry.channel.get_ref().clone(),
-        line: at.line_of(entry.channel.span().start),
-        map: ChannelMap {
-            low,
-            high,
-            one_sided: entry.one_sided,
-            dead_zone: entry.dead_zone,
-        },
-        clip,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -397,6 +463,8 @@ mod tests {
             name: gesture.to_string(),
             gesture: Some(gesture),
             map: None,
+            options: ClassOptions::default(),
+            extra: Vec::new(),
             examples: Vec::new(),
         };
         // A chain of five classes, driven by gestures 4 to 0; gesture 5 drives none.

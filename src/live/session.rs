@@ -81,9 +81,11 @@ pub fn puppet(
     )?;
     let front = character.with_channels(front)?;
     let mut animator = character.animator(&front)?;
+    let inputs = class_inputs(character, &front)?;
     let end_pose = character.end_pose.clone().unwrap_or_else(|| {
-        let mut rest = vec![0.0; character.joints.len()];
+        let mut rest = vec![0.0; animator.coordinates()];
         animator.rest_pose(&mut rest);
+        rest.truncate(character.joints.len());
         rest
     });
     let safety = &character.safety;
@@ -92,7 +94,7 @@ pub fn puppet(
         front,
         animator,
         character.envelope(dt_s),
-        class_inputs(character),
+        inputs,
         end_pose,
         PuppetOptions {
             dt_s,
@@ -111,14 +113,16 @@ pub fn puppet(
 }
 
 /// What drives each class; features are counted as in [`Character::features`].
-fn class_inputs(character: &Character) -> Vec<ClassInput> {
+fn class_inputs(character: &Character, front: &FrontEnd) -> Result<Vec<ClassInput>, ConfigError> {
     let mut features = 0..;
-    (character.classes.iter())
-        .map(|class| ClassInput {
+    let extra = character.extra_channels(front)?;
+    Ok((character.classes.iter().zip(extra))
+        .map(|(class, extra)| ClassInput {
             gesture: class.gesture,
             feature: class.map.as_ref().and_then(|_| features.next()),
+            extra,
         })
-        .collect()
+        .collect())
 }
 
 /// Options of the control loop for `character`.

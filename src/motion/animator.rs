@@ -1,11 +1,14 @@
 //! The animator: gesture waves and channels in, one pose out.
 
 use super::class::{Drive, Played};
-use super::graph::{Graph, Transition, TransitionCounts};
-use super::layer::Layer;
+use super::graph::{Ask, Event, Graph, Plan, Transition, TransitionCounts};
+use super::inertia::Inertia;
+use super::layer::{Layer, LayerInput};
 use super::mapping::Seen;
 use super::node::Node;
-use crate::body::{PoseSpace, RootAdvance, RootPose};
+use super::pins::Pins;
+use super::range::JointRange;
+use crate::body::{Feet, PoseSpace, RootAdvance, RootPose};
 
 /// Classes, the graph between them, and layers on top; all state of the character's motion.
 pub struct Animator {
@@ -13,32 +16,99 @@ pub struct Animator {
     classes: Vec<Node>,
     graph: Graph,
     layers: Vec<Layer>,
+    pins: Option<PinnedFeet>,
+    inertia: Inertia,
+    /// What each coordinate of a difference may be moved by transitions, per second and squared.
+    fastest: Vec<(f64, f64)>,
     played: Vec<Played>,
-    activation: Vec<f64>,
-    /// Two poses one after the other: of the active class and of the one being entered.
+    asks: Vec<Ask>,
+    /// One pose per class, of this step and of the last.
+    poses: Vec<f64>,
+    last_poses: Vec<f64>,
+    /// Two poses one after the other: of the class being left and of the one being entered.
     pair: Vec<f64>,
+    /// What was shown before layers and pins, in the last step and the one before it.
+    shown: Vec<f64>,
+    shown_before: Vec<f64>,
+    difference: Vec<f64>,
+    last_dt_s: f64,
     root: RootPose,
 }
 
+/// Feet that stay where they stand, and which limb of each class they belong to.
+struct PinnedFeet {
+    pins: Pins,
+    /// Classes x feet: index of the limb in the class.
+    limbs: Vec<Option<usize>>,
+    votes: Vec<f64>,
+}
+
+/// Share of the joints' speed and acceleration that the way from one class to another may use.
+const TRANSITION_SHARE: f64 = 0.4;
+
 impl Animator {
-    /// An animator of `classes` (in the order of the graph's nodes) with `layers` on top.
+    /// An animator of `classes` (in the order of the graph's nodes) with `layers` on top. `ranges`: what the
+    /// first coordinates of a difference may do; transitions take as long as they need.
     pub fn new(
         space: Box<dyn PoseSpace>,
         classes: Vec<Node>,
         graph: Graph,
         layers: Vec<Layer>,
+        ranges: &[JointRange],
     ) -> Self {
         let (n, len) = (classes.len(), space.len());
+        let fastest = ranges
+            .iter()
+            .map(|r| {
+                (
+                    TRANSITION_SHARE * r.velocity,
+                    TRANSITION_SHARE * r.acceleration,
+                )
+            })
+            .collect();
         Self {
-            space,
+            inertia: Inertia::new(space.as_ref()),
+            fastest,
+            pins: None,
             played: vec![Played::default(); n],
-            activation: vec![0.0; n],
+            asks: vec![Ask::with(0.0); n],
             classes,
             graph,
             layers,
+            poses: vec![0.0; n * len],
+            last_poses: vec![0.0; n * len],
             pair: vec![0.0; 2 * len],
+            shown: vec![0.0; len],
+            shown_before: vec![0.0; len],
+            difference: vec![0.0; space.tangent_len()],
+            space,
+            last_dt_s: 0.0,
             root: RootPose::default(),
         }
+    }
+
+    /// Keeps `feet` where they stand while the motion has them on the ground.
+    pub fn with_pinned_feet(mut self, feet: Box<dyn Feet>) -> Self {
+        let mut standing = vec![0.0; self.space.len()];
+        self.rest_pose(&mut standing);
+        let limbs = (self.classes.iter())
+            .flat_map(|class| {
+                (0..feet.count())
+                    .map(|f| class.limb(feet.name(f)))
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        self.pins = Some(PinnedFeet {
+            limbs,
+            votes: vec![0.0; feet.count()],
+            pins: Pins::new(feet, &standing),
+        });
+        self
+    }
+
+    /// The body's pose space.
+    pub fn space(&self) -> &dyn PoseSpace {
+        self.space.as_ref()
     }
 
     /// Number of coordinates of a pose.
@@ -59,43 +129,103 @@ impl Animator {
         }
     }
 
-    /// One step of `dt_s`. `drives`: one per class; `channels`: values by channel index. The pose goes
-    /// into `out`. Allocates nothing.
-    pub fn step(&mut self, drives: &[Drive], channels: &[f64], dt_s: f64, out: &mut [f64]) {
-        for ((activation, drive), class) in
-            (self.activation.iter_mut().zip(drives)).zip(&self.classes)
-        {
-            *activation = class.activation(drive);
-        }
-        self.graph.step(&self.activation, dt_s);
+    /// One step of `dt_s`. `drives`: one per class; `input`: what drives the layers. The pose goes into
+    /// `out`. Allocates nothing.
+    pub fn step(&mut self, drives: &[Drive], input: &LayerInput<'_>, dt_s: f64, out: &mut [f64]) {
+        self.play_classes(drives, dt_s);
+        let event = self.step_graph(dt_s);
         let len = self.space.len();
         let active = self.graph.active();
-        let entering = self.graph.transition().map(|t| t.to);
-        let space = self.space.as_ref();
-        let (first, second) = self.pair.split_at_mut(len);
-        for (node, class) in self.classes.iter_mut().enumerate() {
-            // All classes follow their gestures, so that one entered is already in phase; only the
-            // two that show are worth a pose of their own.
-            let pose = if Some(node) == entering {
-                &mut *second
-            } else if node == active {
-                &mut *first
-            } else {
-                &mut *out
-            };
-            self.played[node] = class.step(space, drives[node], dt_s, pose);
-        }
+        let entering = self
+            .graph
+            .transition()
+            .filter(|t| t.jump_in_s.is_none())
+            .map(|t| t.to);
         let blend = self.graph.blend();
-        if entering.is_some() {
-            space.blend(&self.pair, &[1.0 - blend, blend], out);
-        } else {
-            out.copy_from_slice(&self.pair[..len]);
+        let of = |node: usize| node * len..(node + 1) * len;
+        match entering {
+            Some(to) => {
+                self.pair[..len].copy_from_slice(&self.poses[of(active)]);
+                self.pair[len..].copy_from_slice(&self.poses[of(to)]);
+                self.space.blend(&self.pair, &[1.0 - blend, blend], out);
+            }
+            None => out.copy_from_slice(&self.poses[of(active)]),
+        }
+        if let Event::Jumped { to } = event {
+            self.take_up_jump(to, out);
+        }
+        self.inertia.step(self.space.as_ref(), dt_s, out);
+        if dt_s > 0.0 {
+            std::mem::swap(&mut self.shown, &mut self.shown_before);
+            self.shown.copy_from_slice(out);
+            self.last_dt_s = dt_s;
         }
         for layer in &mut self.layers {
-            let value = channels.get(layer.channel).copied().unwrap_or(f64::NAN);
-            layer.step(space, value, dt_s, out);
+            layer.step(self.space.as_ref(), input, dt_s, out);
         }
         self.advance_root(active, entering, blend, dt_s);
+        self.pin_feet(active, entering, blend, dt_s, out);
+    }
+
+    /// Every class follows its gesture, so that one entered is already in phase.
+    fn play_classes(&mut self, drives: &[Drive], dt_s: f64) {
+        std::mem::swap(&mut self.poses, &mut self.last_poses);
+        let len = self.space.len();
+        let entering = self
+            .graph
+            .transition()
+            .filter(|t| t.jump_in_s.is_none())
+            .map(|t| t.to);
+        for (node, class) in self.classes.iter_mut().enumerate() {
+            let shown = node == self.graph.active() || Some(node) == entering;
+            class.show(shown, &drives[node]);
+            let pose = &mut self.poses[node * len..(node + 1) * len];
+            self.played[node] = class.step(self.space.as_ref(), drives[node], dt_s, pose);
+            self.asks[node] = Ask {
+                activation: class.activation(&drives[node]),
+                may_leave: class.may_leave(),
+                done: class.done(),
+            };
+        }
+    }
+
+    fn step_graph(&mut self, dt_s: f64) -> Event {
+        let len = self.space.len();
+        let Self {
+            graph,
+            asks,
+            poses,
+            space,
+            difference,
+            fastest,
+            ..
+        } = self;
+        let mut plan = |from: usize, to: usize| {
+            space.diff(
+                &poses[from * len..(from + 1) * len],
+                &poses[to * len..(to + 1) * len],
+                difference,
+            );
+            Plan::Blend {
+                span_s: eased_span_s(difference, fastest),
+            }
+        };
+        graph.step(asks, dt_s, &mut plan)
+    }
+
+    /// Fades what entering `to` at once leaves between what was shown and `pose`.
+    fn take_up_jump(&mut self, to: usize, pose: &[f64]) {
+        let len = self.space.len();
+        let of = to * len..(to + 1) * len;
+        // The last two steps of both: how the shown motion went, and how the entered one would have.
+        self.inertia.take_up(
+            self.space.as_ref(),
+            (&self.shown, &self.shown_before),
+            (&self.last_poses[of], pose),
+            self.last_dt_s,
+            self.graph.blend_s(),
+            &self.fastest,
+        );
     }
 
     fn advance_root(&mut self, active: usize, entering: Option<usize>, blend: f64, dt_s: f64) {
@@ -105,6 +235,35 @@ impl Animator {
             velocity.add(self.played[node].root_velocity, share);
         }
         self.root.travel(velocity.scaled(dt_s));
+    }
+
+    fn pin_feet(
+        &mut self,
+        active: usize,
+        entering: Option<usize>,
+        blend: f64,
+        dt_s: f64,
+        out: &mut [f64],
+    ) {
+        let Some(feet) = &mut self.pins else { return };
+        let count = feet.votes.len();
+        for (foot, vote) in feet.votes.iter_mut().enumerate() {
+            let of = |node: usize| {
+                feet.limbs[node * count + foot].map_or(self.classes[node].stands(), |limb| {
+                    self.classes[node].contact(limb)
+                })
+            };
+            *vote = match entering {
+                Some(to) => (1.0 - blend) * of(active) + blend * of(to),
+                None => of(active),
+            };
+        }
+        feet.pins.step(&feet.votes, &self.root, dt_s, out);
+    }
+
+    /// Feet that are pinned, where the body has some.
+    pub fn pins(&self) -> Option<&Pins> {
+        self.pins.as_ref().map(|p| &p.pins)
     }
 
     /// Classes, in node order.
@@ -141,4 +300,16 @@ impl Animator {
     pub fn root(&self) -> RootPose {
         self.root
     }
+}
+
+/// How long an eased way along `difference` takes within `fastest`, seconds.
+fn eased_span_s(difference: &[f64], fastest: &[(f64, f64)]) -> f64 {
+    difference
+        .iter()
+        .zip(fastest)
+        .map(|(way, (v, a))| {
+            // Peak slope 15/8 and peak curvature 10/sqrt(3) of the eased way.
+            (1.875 * way.abs() / v).max((5.774 * way.abs() / a).sqrt())
+        })
+        .fold(0.0, f64::max)
 }

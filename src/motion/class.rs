@@ -1,16 +1,24 @@
 //! Motion classes: a space of example clips, played by a gesture's amplitude, frequency and phase.
 //!
 //! Rhodin 2016, section 9.5.2. A cyclic class blends its clips at a common phase that is locked to
-//! the gesture's; every limb keeps its own timeline (eq. 9.7). A path class is driven by progression.
+//! the gesture's; every limb keeps its own timeline (eq. 9.7). A path class is driven by progression,
+//! or plays by the clock once it is asked for.
+
+mod build;
+mod cycle;
+mod path;
 
 use super::clip::{Clip, ClipKind, RootAdvance};
-use super::limbs::timelines;
 use super::range::{JointRange, Steepness};
 use super::smooth::Follower;
-use super::weights::{Parameters, Weights, WeightsError};
-use crate::base::angle::{wrap_pi, wrap_tau};
+use super::weights::{Parameters, Weights};
 use crate::body::PoseSpace;
+pub use build::{ClassError, ClassOptions};
 use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Most parameters of a class beside amplitude and frequency.
+pub const EXTRA: usize = 2;
 
 /// What drives a class at one instant.
 #[derive(Copy, Clone, Debug, Default, PartialEq)]
@@ -21,6 +29,20 @@ pub struct Drive {
     pub frequency_hz: f64,
     /// Phase at this instant, rad.
     pub phase_rad: f64,
+    /// The class's further parameters (turn rate, emotion); not finite: as at rest.
+    pub extra: [f64; EXTRA],
+}
+
+/// What moves a class along.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum Play {
+    /// The gesture: its phase, or its progression.
+    #[default]
+    Gesture,
+    /// The clock, from the start of a path to its end, whenever the gesture is performed anew.
+    Once,
+    /// The clock, round and round.
+    Loop,
 }
 
 /// An example clip with its parameters.
@@ -28,45 +50,8 @@ pub struct Drive {
 pub struct Example {
     /// The clip.
     pub clip: Clip,
-    /// Amplitude and frequency at which it is played pure.
+    /// Amplitude, frequency and further parameters at which it is played pure.
     pub parameters: Parameters,
-}
-
-/// Why a class cannot be built.
-#[derive(Debug, thiserror::Error)]
-pub enum ClassError {
-    /// Cycles and paths in one class.
-    #[error(
-        "class {class}: clip {clip} is a {found}, the others are not; a class has clips of one kind"
-    )]
-    MixedKinds {
-        /// Class name.
-        class: String,
-        /// The odd clip.
-        clip: String,
-        /// Its kind.
-        found: &'static str,
-    },
-    /// Parameters that span no space.
-    #[error("class {class}: {source}")]
-    Weights {
-        /// Class name.
-        class: String,
-        /// What is wrong with the parameters.
-        source: WeightsError,
-    },
-    /// Limbs differ between clips.
-    #[error(
-        "class {class}: clip {clip} has no segment {segment}, other clips have; author all clips of a class for the same legs"
-    )]
-    Limbs {
-        /// Class name.
-        class: String,
-        /// The odd clip.
-        clip: String,
-        /// The missing limb.
-        segment: String,
-    },
 }
 
 /// Below this amplitude the pose is the rest pose whatever the phase.
@@ -78,15 +63,10 @@ const FULL_FROM_AMPLITUDE: f64 = 0.15;
 /// Share of the joints' speed and acceleration that a steady cycle may use; the rest is for changes
 /// of weights, timelines and phase.
 const RANGE_SHARE: f64 = 0.65;
-/// The stride is shortened to this part before phase lock is given up.
-const LEAST_STRIDE: f64 = 0.4;
-/// The phase may gain or lose this part of the tempo to meet the gesture's: out of phase by half a
-/// turn at the onset, it locks within two periods.
-const CATCH_UP: f64 = 0.4;
-/// Share of the joints' speed and acceleration that catching up may use.
-const CATCH_UP_SHARE: f64 = 0.8;
-/// Limbs may gain or lose this part of the phase advance against the body (thesis: 0.95..1.05).
-const LIMB_ADVANCE: f64 = 0.05;
+
+/// How fast further parameters follow, 1/s, and at most how fast they change, 1/s.
+const EXTRA_RATE: f64 = 6.0;
+const EXTRA_SPEED: f64 = 2.0;
 
 /// A class and its state while it is played.
 #[derive(Clone, Debug)]
@@ -95,6 +75,7 @@ pub struct MotionClass {
     pub name: String,
     examples: Vec<Example>,
     kind: ClipKind,
+    options: ClassOptions,
     /// Weights of the moving examples; `moving[i]` is the example of weight i.
     weights_map: Weights,
     moving: Vec<usize>,
@@ -103,23 +84,38 @@ pub struct MotionClass {
     least_amplitude: f64,
     steepness: Steepness,
     ranges: Vec<JointRange>,
-    /// Joints x 1: limb of each joint.
-    limb_of: Vec<Option<usize>>,
+    /// Coordinates of a pose in runs that belong to one limb (or to none).
+    runs: Vec<(Range<usize>, Option<usize>)>,
+    /// Names of the limbs.
+    limbs: Vec<String>,
     /// Examples x limbs: offset of the limb's timeline against the reference clip, rad; `None` for a
     /// clip without moving limbs.
     offsets: Vec<Option<Vec<f64>>>,
-    lock_rate: f64,
+    /// Examples x limbs: where in the clip the limb carries weight.
+    contacts: Vec<Contact>,
     state: State,
+    /// The class is active or being entered.
+    shown: bool,
     // Work space, so that a step allocates nothing.
     sampled: Vec<f64>,
     moving_weights: Vec<f64>,
     weights: Vec<f64>,
 }
 
+/// When a limb carries weight in a clip.
+#[derive(Copy, Clone, Debug, PartialEq)]
+enum Contact {
+    /// The clip does not move on limbs: it stands.
+    Always,
+    /// From touch-down, a fraction of the clip, for another fraction.
+    During { from: f64, duty: f64 },
+}
+
 #[derive(Clone, Debug)]
 struct State {
     amplitude: Follower,
     frequency: Follower,
+    extra: [Follower; EXTRA],
     phase: f64,
     /// Phase speed, rad/s.
     rate: f64,
@@ -127,6 +123,9 @@ struct State {
     limb_shift: Vec<f64>,
     locked: bool,
     stride: f64,
+    /// Of a class that plays once: where it is, and whether it was asked for since it ended.
+    progress: f64,
+    ended: bool,
 }
 
 /// What a class did in one step, for the view and for tests.
@@ -149,77 +148,24 @@ pub struct Played {
 }
 
 impl MotionClass {
-    /// Builds a class from examples for joints with the given ranges.
-    pub fn new(
-        name: &str,
-        examples: Vec<Example>,
-        ranges: Vec<JointRange>,
-    ) -> Result<Self, ClassError> {
-        let rest = examples.iter().position(|e| e.parameters[0] == 0.0);
-        let mut moving: Vec<usize> = (0..examples.len())
-            .filter(|i| examples[*i].parameters[0] > 0.0)
-            .collect();
-        if moving.is_empty() {
-            moving.extend(0..examples.len());
-        }
-        let parameters: Vec<Parameters> = moving.iter().map(|i| examples[*i].parameters).collect();
-        let weights_map = Weights::new(&parameters).map_err(|source| ClassError::Weights {
-            class: name.into(),
-            source,
-        })?;
-        let least_amplitude = parameters
-            .iter()
-            .map(|p| p[0])
-            .fold(f64::INFINITY, f64::min);
-        let kind = examples[0].clip.kind;
-        if let Some(odd) = examples.iter().find(|e| e.clip.kind != kind) {
-            return Err(ClassError::MixedKinds {
-                class: name.into(),
-                clip: odd.clip.name.clone(),
-                found: match odd.clip.kind {
-                    ClipKind::Cycle => "cycle",
-                    ClipKind::Path => "path",
-                },
-            });
-        }
-        let joints = examples[0].clip.coordinates();
-        let clips: Vec<&Clip> = examples.iter().map(|e| &e.clip).collect();
-        let steepness = Steepness::of(&clips);
-        let (limb_of, offsets) = timelines(name, &clips, joints)?;
-        let limbs = offsets.iter().flatten().map(Vec::len).max().unwrap_or(0);
-        let count = examples.len();
-        let frequency = weights_map.frequencies().0;
-        Ok(Self {
-            name: name.into(),
-            examples,
-            kind,
-            moving_weights: vec![0.0; moving.len()],
-            weights_map,
-            moving,
-            rest,
-            least_amplitude,
-            steepness,
-            ranges,
-            limb_of,
-            offsets,
-            lock_rate: 4.0,
-            state: State {
-                amplitude: Follower::at(0.0),
-                frequency: Follower::at(frequency),
-                phase: 0.0,
-                rate: 0.0,
-                limb_shift: vec![0.0; limbs],
-                locked: true,
-                stride: 1.0,
-            },
-            sampled: vec![0.0; count * joints],
-            weights: vec![0.0; count],
-        })
-    }
-
     /// Whether the class repeats.
     pub fn kind(&self) -> ClipKind {
         self.kind
+    }
+
+    /// What moves it along.
+    pub fn play(&self) -> Play {
+        self.options.play
+    }
+
+    /// The example clips with their parameters.
+    pub fn examples(&self) -> &[Example] {
+        &self.examples
+    }
+
+    /// Names of the limbs that have timelines of their own.
+    pub fn limbs(&self) -> &[String] {
+        &self.limbs
     }
 
     /// Blend weight of every example in the last step.
@@ -231,10 +177,58 @@ impl MotionClass {
     pub fn rest_pose(&mut self, space: &dyn PoseSpace, out: &mut [f64]) {
         let (lowest, _) = self.weights_map.frequencies();
         match self.kind {
-            ClipKind::Cycle => self.weigh([0.0, lowest], 1.0),
-            ClipKind::Path => self.weigh([1.0, 0.0], 1.0),
+            ClipKind::Cycle => self.weigh(self.wish(0.0, lowest), 1.0),
+            ClipKind::Path => self.weigh(self.wish(1.0, 0.0), 1.0),
         }
         self.sample(space, 0.0, out);
+    }
+
+    /// Whether the class is at a point where it may be left: in one of its windows of phase or
+    /// progression, if it has any; a class that plays once, at its end.
+    pub fn may_leave(&self) -> bool {
+        let at = match (self.options.play, self.kind) {
+            (Play::Once, _) => self.state.progress,
+            (_, ClipKind::Cycle) => self.state.phase / TAU,
+            (_, ClipKind::Path) => self.state.amplitude.value,
+        };
+        let windows = &self.options.leave;
+        if windows.is_empty() {
+            return self.options.play != Play::Once
+                || self.state.ended
+                || self.state.progress == 0.0;
+        }
+        // Standing still there is no point of the motion to wait for.
+        let still = self.options.play == Play::Gesture && self.state.amplitude.value < AT_REST;
+        still || self.state.ended || windows.iter().any(|w| inside(*w, at))
+    }
+
+    /// Of a class that plays once: it has reached its end.
+    pub fn done(&self) -> bool {
+        self.options.play == Play::Once && self.state.ended
+    }
+
+    /// How much `drive` asks for the class.
+    pub(super) fn activation(&self, drive: &Drive) -> f64 {
+        match self.options.play {
+            // A gesture in the opposite sense does not activate the class.
+            _ if drive.frequency_hz < 0.0 => 0.0,
+            // Once begun it is played whatever the gesture does; ended, it waits for the next time.
+            Play::Once if self.state.ended => 0.0,
+            Play::Once if self.state.progress > 0.0 => 1.0,
+            _ => drive.amplitude,
+        }
+    }
+
+    /// Tells a class whether it shows (is active or being entered): only then the clock moves it.
+    pub(super) fn show(&mut self, shown: bool, drive: &Drive) {
+        self.shown = shown;
+        if !shown && self.options.play == Play::Once {
+            self.state.progress = 0.0;
+            if !(drive.amplitude > FULL_FROM_AMPLITUDE) {
+                // The gesture was released: the next one plays it anew.
+                self.state.ended = false;
+            }
+        }
     }
 
     /// Sets the weights for a wish, with the motion scaled to `stride` of its size.
@@ -258,6 +252,24 @@ impl MotionClass {
         }
     }
 
+    /// Draws the class's further parameters towards what drives them.
+    fn follow_extra(&mut self, drive: &Drive, dt_s: f64) {
+        for (follower, goal) in self.state.extra.iter_mut().zip(drive.extra) {
+            let goal = if goal.is_finite() { goal } else { 0.0 };
+            follower.step(goal, EXTRA_RATE, EXTRA_SPEED, dt_s);
+        }
+    }
+
+    /// The parameters of amplitude and frequency, with the class's others as they are now.
+    fn wish(&self, amplitude: f64, frequency_hz: f64) -> Parameters {
+        let [third, fourth] = &self.state.extra;
+        match self.weights_map.dimensions() {
+            0..=2 => [amplitude, frequency_hz].into(),
+            3 => [amplitude, frequency_hz, third.value].into(),
+            _ => [amplitude, frequency_hz, third.value, fourth.value].into(),
+        }
+    }
+
     /// One step of `dt_s` under `drive`; the pose goes into `out`. Allocates nothing.
     pub fn step(
         &mut self,
@@ -266,210 +278,94 @@ impl MotionClass {
         dt_s: f64,
         out: &mut [f64],
     ) -> Played {
-        match self.kind {
-            ClipKind::Cycle => self.step_cycle(space, drive, dt_s, out),
-            ClipKind::Path => self.step_path(space, drive, dt_s, out),
-        }
-    }
-
-    fn step_cycle(
-        &mut self,
-        space: &dyn PoseSpace,
-        drive: Drive,
-        dt_s: f64,
-        out: &mut [f64],
-    ) -> Played {
-        let (lowest_hz, highest_hz) = self.weights_map.frequencies();
-        // A gesture in the opposite sense is another gesture, not this one played backwards.
-        let performed = drive.frequency_hz > 0.0 && drive.amplitude.is_finite();
-        let wanted = if performed {
-            awake(drive.amplitude)
-        } else {
-            0.0
-        };
-        let state = &mut self.state;
-        let amplitude = state
-            .amplitude
-            .step(wanted.min(1.0), 9.0, 1.7, dt_s)
-            .max(0.0);
-        let mut coming_hz: f64 = 0.0;
-        if performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
-            let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
-            if amplitude < AT_REST {
-                // Nothing moves yet: begin at the tempo that is shown.
-                state.frequency = Follower::at(goal);
-            }
-            state.frequency.step(goal, 10.0, 4.0, dt_s);
-            coming_hz = goal;
-        }
-        let frequency_hz = state.frequency.value;
-        let wish = [amplitude, frequency_hz];
-
-        // Range: shorten the stride first, then hold the highest frequency and give up the lock.
-        self.weigh(wish, 1.0);
-        let rate = TAU * frequency_hz;
-        let allowed = self.steepness.scale_limit(
-            &self.weights,
-            // Where the tempo is going counts too: the stride is short before the legs are fast.
-            rate.max(self.state.rate).max(TAU * coming_hz),
-            &self.ranges,
-            RANGE_SHARE,
-        );
-        let state = &mut self.state;
-        let stride_goal = allowed.clamp(LEAST_STRIDE, 1.0);
-        // Shorten at once, lengthen at leisure: the limit is the joints', the comfort ours.
-        let follow = if stride_goal < state.stride {
-            0.05
-        } else {
-            0.3
-        };
-        state.stride += (stride_goal - state.stride) * (dt_s / follow).min(1.0);
-        let highest_rate = if allowed < LEAST_STRIDE {
-            self.steepness
-                .rate_limit(&self.weights, LEAST_STRIDE, &self.ranges, RANGE_SHARE)
-        } else {
-            f64::INFINITY
-        };
-        state.locked = rate <= highest_rate;
-
-        let goal_rate = if state.locked {
-            // Second-order lock: feed-forward of the gesture's frequency, correction of the phase.
-            let lag = wrap_pi(drive.phase_rad - (state.phase + rate * dt_s));
-            let bound = CATCH_UP * rate;
-            let correction = if wanted > 0.0 && lag.is_finite() {
-                (self.lock_rate * lag).clamp(-bound, bound)
-            } else {
-                0.0
-            };
-            // Catching up may use more of the joints than a steady cycle, but not all of them.
-            let most = self.steepness.rate_limit(
-                &self.weights,
-                state.stride,
-                &self.ranges,
-                CATCH_UP_SHARE,
-            );
-            rate + correction.min((most - rate).max(0.0))
-        } else {
-            highest_rate
-        };
-        let follow = 1.0 - (-dt_s / 0.06).exp();
-        state.rate += (goal_rate - state.rate) * follow;
-        let at_rest = amplitude < AT_REST;
-        if at_rest {
-            // Standing still: nobody sees the phase, so it may be right when the first step comes.
-            state.rate = goal_rate;
-            state.phase = drive.phase_rad;
-            if !state.phase.is_finite() {
-                state.phase = 0.0;
-            }
-        }
-        let advance = state.rate * dt_s;
-        state.phase = wrap_tau(state.phase + advance);
-        self.weigh(wish, self.state.stride);
-        self.shift_limbs(advance, at_rest);
-
-        let phase = self.state.phase;
-        self.sample(space, phase, out);
-        let mut velocity = RootAdvance::default();
-        let per_second = self.state.rate / TAU;
-        for (example, weight) in self.examples.iter().zip(&self.weights) {
-            velocity.forward_m += weight * example.clip.root.forward_m * per_second;
-            velocity.left_m += weight * example.clip.root.left_m * per_second;
-            velocity.yaw_rad += weight * example.clip.root.yaw_rad * per_second;
-        }
-        Played {
-            phase_rad: phase,
-            frequency_hz: self.state.rate / TAU,
-            amplitude,
-            stride: self.state.stride,
-            locked: self.state.locked,
-            root_velocity: velocity,
-            uncertainty: 0.0,
-        }
-    }
-
-    fn step_path(
-        &mut self,
-        space: &dyn PoseSpace,
-        drive: Drive,
-        dt_s: f64,
-        out: &mut [f64],
-    ) -> Played {
-        let wanted = if drive.amplitude.is_finite() {
-            awake(drive.amplitude).min(1.0)
-        } else {
-            0.0
-        };
-        self.weigh([1.0, 0.0], 1.0);
-        // Steepness is kept per radian of phase; one progression is one turn of it.
-        let fastest = self
-            .steepness
-            .rate_limit(&self.weights, 1.0, &self.ranges, RANGE_SHARE)
-            / TAU;
-        let progression = self
-            .state
-            .amplitude
-            .step(wanted, 9.0_f64.min(2.0 * fastest), fastest.min(1e3), dt_s)
-            .clamp(0.0, 1.0);
-        self.sample(space, progression * TAU, out);
-        Played {
-            phase_rad: progression * TAU,
-            frequency_hz: 0.0,
-            amplitude: progression,
-            stride: 1.0,
-            locked: true,
-            root_velocity: RootAdvance::default(),
-            uncertainty: 0.0,
-        }
-    }
-
-    /// Moves limb timelines towards the blend of the clips' offsets, at most 5 % of the advance.
-    fn shift_limbs(&mut self, advance: f64, at_rest: bool) {
-        let bound = LIMB_ADVANCE * advance.abs();
-        for limb in 0..self.state.limb_shift.len() {
-            let mut moving = 0.0;
-            // The mean of angles is that of their unit vectors (eq. 9.7 is circular).
-            let (mut sin, mut cos) = (0.0, 0.0);
-            for (offsets, weight) in self.offsets.iter().zip(&self.weights) {
-                if let Some(offsets) = offsets {
-                    moving += weight;
-                    sin += weight * offsets[limb].sin();
-                    cos += weight * offsets[limb].cos();
-                }
-            }
-            // Opposite offsets cancel out: then the limb stays with the timeline it has.
-            if moving > 1e-9 && sin.hypot(cos) > 0.05 * moving {
-                let shift = &mut self.state.limb_shift[limb];
-                let gap = wrap_pi(sin.atan2(cos) - *shift);
-                *shift += if at_rest {
-                    gap
-                } else {
-                    gap.clamp(-bound, bound)
+        match (self.options.play, self.kind) {
+            (Play::Gesture, ClipKind::Path) => self.step_path(space, drive, dt_s, out),
+            (Play::Once, _) => self.step_once(space, drive, dt_s, out),
+            (Play::Gesture, ClipKind::Cycle) => self.step_cycle(space, drive, dt_s, out),
+            (Play::Loop, _) => {
+                // The clock performs the gesture.
+                let frequency_hz = self.weights_map.frequencies().0;
+                let clock = Drive {
+                    amplitude: 1.0,
+                    frequency_hz,
+                    phase_rad: self.state.phase + TAU * frequency_hz * dt_s,
+                    extra: drive.extra,
                 };
+                self.step_cycle(space, clock, dt_s, out)
             }
         }
+    }
+
+    /// The point of example `example` at which its limb (or what belongs to none) is, 0..1.
+    fn point(&self, example: usize, limb: Option<usize>, phase: f64) -> f64 {
+        let shift = match (limb, &self.offsets[example]) {
+            (Some(limb), Some(offsets)) if self.kind == ClipKind::Cycle => {
+                self.state.limb_shift[limb] - offsets[limb]
+            }
+            _ => 0.0,
+        };
+        (phase + shift) / TAU
     }
 
     /// Samples every example at its limbs' phases and blends them.
     fn sample(&mut self, space: &dyn PoseSpace, phase: f64, out: &mut [f64]) {
-        let joints = out.len();
-        for (e, example) in self.examples.iter().enumerate() {
+        let len = out.len();
+        for e in 0..self.examples.len() {
             if self.weights[e] == 0.0 {
                 continue;
             }
-            for joint in 0..joints {
-                let shift = match (self.limb_of[joint], &self.offsets[e]) {
-                    (Some(limb), Some(offsets)) => self.state.limb_shift[limb] - offsets[limb],
-                    _ => 0.0,
-                };
-                let u = match self.kind {
-                    ClipKind::Cycle => (phase + shift) / TAU,
-                    ClipKind::Path => phase / TAU,
-                };
-                self.sampled[e * joints + joint] = example.clip.sample(u, joint);
+            for (run, limb) in &self.runs {
+                let u = self.point(e, *limb, phase);
+                let into = e * len + run.start..e * len + run.end;
+                let clip = &self.examples[e].clip;
+                clip.sample_range(u, run.clone(), &mut self.sampled[into]);
             }
         }
         space.blend(&self.sampled, &self.weights, out);
+    }
+
+    /// Where the phase of the last sample is, for contacts.
+    fn shown_phase(&self) -> f64 {
+        match (self.options.play, self.kind) {
+            (Play::Once, _) => self.state.progress * TAU,
+            (_, ClipKind::Cycle) => self.state.phase,
+            (_, ClipKind::Path) => self.state.amplitude.value.clamp(0.0, 1.0) * TAU,
+        }
+    }
+
+    /// How much of the blend has limb `limb` on the ground, 0..1: a vote of the clips, each at the
+    /// limb's own phase (section 9.5.2).
+    pub fn contact(&self, limb: usize) -> f64 {
+        let phase = self.shown_phase();
+        let limbs = self.limbs.len();
+        let mut vote = 0.0;
+        for (e, weight) in self.weights.iter().enumerate() {
+            let on = match self.contacts[e * limbs + limb] {
+                Contact::Always => true,
+                Contact::During { from, duty } => {
+                    let u = self.point(e, Some(limb), phase);
+                    // The end of a path is not its beginning.
+                    let u = if self.kind == ClipKind::Path {
+                        u.min(1.0 - 1e-9)
+                    } else {
+                        u
+                    };
+                    duty >= 1.0 || (u - from).rem_euclid(1.0) < duty
+                }
+            };
+            vote += if on { *weight } else { 0.0 };
+        }
+        vote
+    }
+}
+
+/// Whether `at` lies in a window of phase; one whose end comes before its start goes over the seam.
+fn inside(window: [f64; 2], at: f64) -> bool {
+    let [from, to] = window;
+    if from <= to {
+        (from..=to).contains(&at)
+    } else {
+        at >= from || at <= to
     }
 }
 

@@ -5,13 +5,21 @@
 //! ```toml
 //! version = 1
 //! name = "trot_long"
-//! gait = "trot"            # walk, trot, pace, bound or stand
+//! gait = "trot"            # four legs: walk, trot, pace, bound, gallop, rotary_gallop, pronk;
+//!                          # six: tripod, ripple, wave; any: stand
 //! frequency_hz = 1.6       # cycles per second that it must be able to play
-//! stride_m = 0.12          # how far the body travels in one cycle
+//! stride_m = 0.12          # how far the body travels in one cycle, along its way
+//! left_m = 0.0             # and to its left
+//! turn_rad = 0.0           # how far the body turns in one cycle, counter-clockwise: with stride_m a
+//!                          # curve of radius stride / turn, with stride_m = 0.0 in place
 //! duty_factor = 0.5        # fraction of the cycle a foot is on the ground
 //! step_height_m = 0.025
 //! body_height_m = 0.15     # of the root link above the feet
-//! turn_rad = 0.0           # how far the body turns in one cycle, counter-clockwise
+//! stance_width_m = 0.0     # feet this much further out than below the hips,
+//! stance_length_m = 0.0    # and this much further to the front and the rear
+//! sway_m = 0.0             # the body swings to the side that carries, once per cycle,
+//! sway_roll_rad = 0.0      # rolls with it (right side down while it is right),
+//! bob_m = 0.0              # and goes up and down twice
 //! # [phase]                # own touch-down phases, fraction of the cycle, instead of the preset's
 //! # front_left = 0.5
 //! ```
@@ -21,98 +29,45 @@
 //! name = "bow"
 //! [[pose]]
 //! body_height_m = 0.15
-//! [[pose]]                 # the last pose is progression 1
+//! [[pose]]
+//! at = 0.4                 # progression at which it is reached; evenly spread when not given
 //! body_height_m = 0.12
 //! pitch_rad = 0.3          # nose down
 //! forward_m = -0.02
+//! [[pose]]                 # the last pose is progression 1
+//! feet = { front_left = [0.03, 0.0, 0.06] }  # from where the foot stands: forwards, left, up, m
 //! ```
 
+pub use super::gait_presets::GaitName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Presets: touch-down phases per leg.
-#[derive(Copy, Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum GaitName {
-    /// Lateral-sequence walk: rear left, front left, rear right, front right, a quarter apart.
-    Walk,
-    /// Diagonal legs together.
-    Trot,
-    /// Legs of one side together.
-    Pace,
-    /// Front legs together, rear legs together.
-    Bound,
-    /// All feet stay on the ground.
-    Stand,
-}
-
-impl GaitName {
-    /// All presets with their names.
-    pub const ALL: [(&'static str, GaitName); 5] = [
-        ("walk", GaitName::Walk),
-        ("trot", GaitName::Trot),
-        ("pace", GaitName::Pace),
-        ("bound", GaitName::Bound),
-        ("stand", GaitName::Stand),
-    ];
-
-    /// The preset called `name`.
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL
-            .iter()
-            .find(|(n, _)| *n == name)
-            .map(|(_, gait)| *gait)
-    }
-
-    /// Touch-down phase of a leg, fraction of the cycle. Unknown legs start at zero.
-    pub fn phase(self, leg: &str) -> f64 {
-        let [rear_left, front_left, rear_right, front_right] = match self {
-            GaitName::Walk => [0.0, 0.25, 0.5, 0.75],
-            GaitName::Trot => [0.0, 0.5, 0.5, 0.0],
-            GaitName::Pace => [0.0, 0.0, 0.5, 0.5],
-            GaitName::Bound => [0.0, 0.5, 0.0, 0.5],
-            GaitName::Stand => [0.0; 4],
-        };
-        match leg {
-            "rear_left" => rear_left,
-            "front_left" => front_left,
-            "rear_right" => rear_right,
-            "front_right" => front_right,
-            _ => 0.0,
-        }
-    }
-
-    /// Duty factor when none is given.
-    pub fn duty_factor(self) -> f64 {
-        match self {
-            GaitName::Walk => 0.7,
-            GaitName::Stand => 1.0,
-            _ => 0.5,
-        }
-    }
-}
-
-/// One pose of the body over feet that stay on the ground.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// One pose of the body over its feet, which stay on the ground unless named.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BodyPose {
     /// Height of the root link above the feet; that of the description when not given.
     pub body_height_m: Option<f64>,
     /// Nose down is positive, rad.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub pitch_rad: f64,
     /// Right side down is positive, rad.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub roll_rad: f64,
     /// Counter-clockwise seen from above, rad.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub yaw_rad: f64,
     /// Body displacement forwards, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub forward_m: f64,
     /// Body displacement to the left, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub left_m: f64,
+    /// Progression at which the pose is reached, 0..1.
+    pub at: Option<f64>,
+    /// Feet that are elsewhere: by leg, from where the foot stands, forwards, left and up, m.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub feet: BTreeMap<String, [f64; 3]>,
 }
 
 /// A gait or a way through poses, as an author writes it. Lengths not given follow from the legs.
@@ -124,14 +79,17 @@ pub struct GaitDescription {
     /// Name of the clip.
     pub name: String,
     /// Where it comes from.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub origin: String,
     /// Preset of touch-down phases; a gait has this or `phase`.
     pub gait: Option<GaitName>,
     /// Cycles per second that the gait must be able to play.
     pub frequency_hz: Option<f64>,
-    /// Body travel per cycle, m; negative is backwards.
+    /// Body travel per cycle along its way, m; negative is backwards.
     pub stride_m: Option<f64>,
+    /// Body travel per cycle to its left, m.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub left_m: f64,
     /// Fraction of the cycle a foot is on the ground, 0.1..1.
     pub duty_factor: Option<f64>,
     /// Highest foot clearance in swing, m.
@@ -139,14 +97,38 @@ pub struct GaitDescription {
     /// Height of the root link above the feet, m.
     pub body_height_m: Option<f64>,
     /// Turn per cycle, rad, counter-clockwise.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub turn_rad: f64,
+    /// Feet further out than they stand by themselves, m on each side.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub stance_width_m: f64,
+    /// Feet further from the middle, to the front and the rear, m.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub stance_length_m: f64,
+    /// The body swings to the side that carries, m, once per cycle.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub sway_m: f64,
+    /// It rolls with the sway, rad (right side down while it is right).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub sway_roll_rad: f64,
+    /// It goes up and down, m, twice per cycle.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub bob_m: f64,
     /// Touch-down phase per leg, fraction of the cycle.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub phase: BTreeMap<String, f64>,
     /// A way through poses instead of a gait; two or more.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pose: Vec<BodyPose>,
+}
+
+/// For serde, which hands over a reference.
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature serde asks for"
+)]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// Why a description cannot become a clip.
@@ -215,7 +197,13 @@ impl GaitDescription {
             duty_factor: None,
             step_height_m: None,
             body_height_m: None,
+            left_m: 0.0,
             turn_rad: 0.0,
+            stance_width_m: 0.0,
+            stance_length_m: 0.0,
+            sway_m: 0.0,
+            sway_roll_rad: 0.0,
+            bob_m: 0.0,
             phase: BTreeMap::new(),
             pose: Vec::new(),
         }
@@ -279,24 +267,90 @@ impl GaitDescription {
                 return bad("phase", format!("{leg} = {phase} is not in 0..1"));
             }
         }
+        let lengths = [
+            ("left_m", self.left_m, 5.0),
+            ("stance_width_m", self.stance_width_m, 1.0),
+            ("stance_length_m", self.stance_length_m, 1.0),
+            ("sway_m", self.sway_m, 0.5),
+            ("sway_roll_rad", self.sway_roll_rad, 0.5),
+            ("bob_m", self.bob_m, 0.5),
+        ];
+        for (key, value, most) in lengths {
+            if !(value.abs() <= most) {
+                return bad(key, format!("{value} is not in -{most}..{most}"));
+            }
+        }
+        if self.gait == Some(GaitName::Stand)
+            && (self.turn_rad != 0.0 || self.left_m != 0.0 || self.stride_m.unwrap_or(0.0) != 0.0)
+        {
+            return bad(
+                "gait",
+                "stand goes nowhere; leave out stride_m, left_m and turn_rad".into(),
+            );
+        }
         for pose in &self.pose {
-            let angles = [pose.pitch_rad, pose.roll_rad, pose.yaw_rad];
-            if !angles.iter().all(|a| (-1.2..=1.2).contains(a)) {
-                return bad(
-                    "pose",
-                    format!("angles {angles:?} must lie in -1.2..1.2 rad"),
-                );
-            }
-            if let Some(h) = pose.body_height_m
-                && !(h > 0.0 && h <= 5.0)
-            {
-                return bad(
-                    "pose",
-                    format!("body_height_m = {h} is not in 0..5 (above 0)"),
-                );
-            }
-            if !(pose.forward_m.abs() <= 2.0 && pose.left_m.abs() <= 2.0) {
-                return bad("pose", "forward_m and left_m must lie in -2..2".into());
+            pose.check()?;
+        }
+        self.pose_times().map(|_| ())
+    }
+
+    /// Progression at which each pose is reached: 0 to 1, rising.
+    pub fn pose_times(&self) -> Result<Vec<f64>, GaitError> {
+        let last = self.pose.len().saturating_sub(1).max(1);
+        let inner = self.pose.get(1..last).unwrap_or_default();
+        let given = inner.iter().filter(|p| p.at.is_some()).count();
+        let bad = |problem: String| {
+            Err(GaitError::Value {
+                key: "pose.at",
+                problem,
+            })
+        };
+        if given != 0 && given != inner.len() {
+            return bad(format!(
+                "{given} of the {} poses between the first and the last have it; give it to all of them or to none",
+                inner.len()
+            ));
+        }
+        let times: Vec<f64> = self
+            .pose
+            .iter()
+            .enumerate()
+            .map(|(k, pose)| pose.at.unwrap_or(k as f64 / last as f64))
+            .collect();
+        let ends = (times.first().copied(), times.last().copied());
+        if !times.is_empty() && ends != (Some(0.0), Some(1.0)) {
+            return bad("the first pose is at 0 and the last at 1".into());
+        }
+        if times.windows(2).any(|w| !(w[1] - w[0] >= 0.01)) {
+            return bad(format!("{times:?} must rise by 0.01 or more"));
+        }
+        Ok(times)
+    }
+}
+
+impl BodyPose {
+    fn check(&self) -> Result<(), GaitError> {
+        let bad = |problem: String| {
+            Err(GaitError::Value {
+                key: "pose",
+                problem,
+            })
+        };
+        let angles = [self.pitch_rad, self.roll_rad, self.yaw_rad];
+        if !angles.iter().all(|a| (-1.2..=1.2).contains(a)) {
+            return bad(format!("angles {angles:?} must lie in -1.2..1.2 rad"));
+        }
+        if let Some(h) = self.body_height_m
+            && !(h > 0.0 && h <= 5.0)
+        {
+            return bad(format!("body_height_m = {h} is not in 0..5 (above 0)"));
+        }
+        if !(self.forward_m.abs() <= 2.0 && self.left_m.abs() <= 2.0) {
+            return bad("forward_m and left_m must lie in -2..2".into());
+        }
+        for (leg, way) in &self.feet {
+            if !way.iter().all(|v| v.abs() <= 2.0) {
+                return bad(format!("feet.{leg} = {way:?} must lie in -2..2 m"));
             }
         }
         Ok(())
@@ -326,6 +380,15 @@ mod tests {
                 "version = 1\nname='x'\n[[pose]]\npitch_rad=0.1",
                 "two or more",
             ),
+            (
+                "version = 1\nname='x'\n[[pose]]\n[[pose]]\nat=0.6\n[[pose]]\nat=0.4\n[[pose]]",
+                "must rise",
+            ),
+            (
+                "version = 1\nname='x'\n[[pose]]\n[[pose]]\nfeet={front_left=[0,0,nan]}",
+                "front_left",
+            ),
+            ("version = 1\nname='x'\ngait='stand'\nturn_rad=0.2", "stand"),
         ] {
             let message = GaitDescription::from_toml(text)
                 .expect_err("wrong on purpose")

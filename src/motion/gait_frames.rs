@@ -1,19 +1,26 @@
 //! Frames of a gait: foot paths, leg inverse kinematics, and what the joints allow.
 
 use super::clip::{Clip, ClipFile, ClipKind, RootAdvance, Segment};
-use super::gait::{BodyPose, GaitDescription, GaitError, GaitName};
-use super::range::{JointRange, cycle_limit};
+use super::gait::{GaitDescription, GaitError, GaitName};
+use super::gait_paths::path_clip;
+use super::gait_stance::Stance;
+pub use super::gait_stance::Walker;
+use super::range::cycle_limit;
 use super::smooth::ease;
-use crate::robot::leg::LegError;
-use crate::robot::{Leg, RobotModel};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use crate::robot::RobotModel;
+use nalgebra::{Isometry2, Point2, Point3, Vector2};
+use std::f64::consts::TAU;
 
-/// Frames of a cycle. Foot paths are twice differentiable, so a spline through 64 follows them closely.
-const CYCLE_FRAMES: usize = 64;
-/// Frames of a path between two poses.
-const PATH_FRAMES: usize = 17;
+/// Frames of a cycle; doubled, at most to [`MOST_FRAMES`], until the feet stay where they stand.
+const LEAST_FRAMES: usize = 64;
+/// See [`LEAST_FRAMES`].
+const MOST_FRAMES: usize = 512;
+/// How far the spline through the frames may carry a foot off its spot in stance, metres.
+const STANCE_ERROR_M: f64 = 1e-4;
 /// A stride is never shortened below this part of what was asked for.
 const LEAST_STRIDE: f64 = 0.3;
+/// Share of the highest frequency that a gait is made for when none is asked.
+const TEMPO_SHARE: f64 = 0.8;
 
 /// A clip made from a description, with what had to be changed.
 #[derive(Clone, Debug)]
@@ -24,50 +31,38 @@ pub struct Authored {
     pub max_frequency: Option<(f64, String)>,
     /// How much of the asked stride and step height was kept, 0..1.
     pub stride_kept: f64,
+    /// Farthest that a foot in stance is from its spot on the ground, metres (cycles only).
+    pub stance_error_m: f64,
 }
 
-/// Makes a clip for the legs of `model`.
+/// Makes a clip for the legs of `walker`.
 ///
-/// `ranges`: speed and acceleration each joint may use, in joint order. When the joints are too
-/// slow for `frequency_hz`, stride and step height are shortened to what they can do, down to 30 %;
-/// `strict` refuses instead.
+/// When the joints are too slow for `frequency_hz`, stride and step height are shortened to what they
+/// can do, down to 30 %; `strict` refuses instead. Without `frequency_hz` the gait is made for its
+/// natural tempo, or 80 % of what the joints can do if that is less.
 pub fn author(
     description: &GaitDescription,
-    model: &RobotModel,
-    legs: &[Leg],
-    ranges: &[JointRange],
+    walker: Walker<'_>,
     strict: bool,
 ) -> Result<Authored, GaitError> {
     description.check()?;
-    for leg in description.phase.keys() {
-        if !legs.iter().any(|l| l.name == *leg) {
-            let names: Vec<&str> = legs.iter().map(|l| l.name.as_str()).collect();
-            return Err(GaitError::Value {
-                key: "phase",
-                problem: format!("leg {leg} is not one of {}", names.join(", ")),
-            });
-        }
-    }
     if !description.pose.is_empty() {
-        let file = path_clip(description, model, legs)?;
         return Ok(Authored {
-            file,
+            file: path_clip(description, walker)?,
             max_frequency: None,
             stride_kept: 1.0,
+            stance_error_m: 0.0,
         });
     }
-    let joints = model.joint_names();
-    let attempt = |kept: f64| -> Result<(ClipFile, f64, usize), GaitError> {
-        let file = cycle_clip(description, model, legs, kept)?;
-        let clip = file.for_body(&joints).map_err(|e| GaitError::Value {
-            key: "name",
-            problem: e.to_string(),
-        })?;
-        let (max_hz, joint) = cycle_limit(&clip, ranges);
-        Ok((file, max_hz, joint))
+    check_legs(description, walker)?;
+    let joints = walker.model.joint_names();
+    let attempt = |kept: f64, frames: usize| -> Result<(Cycle, f64, usize), GaitError> {
+        let cycle = Cycle::new(description, walker, kept, frames)?;
+        let (max_hz, joint) = cycle_limit(&cycle.clip, walker.ranges);
+        Ok((cycle, max_hz, joint))
     };
     let frequency_hz = description.frequency_hz.unwrap_or(0.0);
-    let (mut file, mut max_hz, mut joint) = attempt(1.0)?;
+    let (mut cycle, mut max_hz, mut joint) = attempt(1.0, LEAST_FRAMES)?;
     let mut kept = 1.0;
     if max_hz < frequency_hz {
         let too_fast = |max_hz: f64, joint: usize, least: f64| GaitError::TooFast {
@@ -80,7 +75,7 @@ pub fn author(
         if strict {
             return Err(too_fast(max_hz, joint, 1.0));
         }
-        let (_, least_hz, least_joint) = attempt(LEAST_STRIDE)?;
+        let (_, least_hz, least_joint) = attempt(LEAST_STRIDE, LEAST_FRAMES)?;
         if least_hz < frequency_hz {
             return Err(too_fast(least_hz, least_joint, LEAST_STRIDE));
         }
@@ -88,161 +83,265 @@ pub fn author(
         let (mut low, mut high) = (LEAST_STRIDE, 1.0);
         while high - low > 0.01 {
             let middle = 0.5 * (low + high);
-            if attempt(middle)?.1 >= frequency_hz {
+            // A little room, for more frames follow a foot path more closely.
+            if attempt(middle, LEAST_FRAMES)?.1 >= 1.01 * frequency_hz {
                 low = middle;
             } else {
                 high = middle;
             }
         }
         kept = low;
-        (file, max_hz, joint) = attempt(kept)?;
+        (cycle, max_hz, joint) = attempt(kept, LEAST_FRAMES)?;
+    }
+    let mut frames = LEAST_FRAMES;
+    let mut stance_error_m = cycle.stance_error_m(walker);
+    while stance_error_m > STANCE_ERROR_M && frames < MOST_FRAMES {
+        frames *= 2;
+        (cycle, max_hz, joint) = attempt(kept, frames)?;
+        stance_error_m = cycle.stance_error_m(walker);
+    }
+    let mut file = cycle.file;
+    if description.frequency_hz.is_none() && max_hz.is_finite() {
+        let tempo = description.gait.map_or(0.2, GaitName::tempo);
+        let natural = tempo * (9.81 / cycle.leg_length_m).sqrt();
+        let hz = natural.min(TEMPO_SHARE * max_hz);
+        file.frequency_hz = (hz * 100.0).floor() / 100.0;
     }
     Ok(Authored {
         file,
         max_frequency: max_hz.is_finite().then(|| (max_hz, joints[joint].clone())),
         stride_kept: kept,
+        stance_error_m,
     })
 }
 
-/// Ground contact of every foot when the body stands still.
-struct Stance {
-    neutral: Vec<Point3<f64>>,
-    body_height_m: f64,
+/// Every leg must have a phase, and every phase a leg.
+fn check_legs(description: &GaitDescription, walker: Walker<'_>) -> Result<(), GaitError> {
+    let names: Vec<&str> = walker.legs.iter().map(|l| l.name.as_str()).collect();
+    for leg in description.phase.keys() {
+        if !names.contains(&leg.as_str()) {
+            return Err(GaitError::Value {
+                key: "phase",
+                problem: format!("leg {leg} is not one of {}", names.join(", ")),
+            });
+        }
+    }
+    let all_given = names.iter().all(|leg| description.phase.contains_key(*leg));
+    let fits = |gait: GaitName| all_given || gait.legs().is_none_or(|n| n == names.len());
+    let without = names
+        .iter()
+        .find(|leg| phase_of(description, leg).is_none() || !description.gait.is_none_or(fits));
+    match (without, description.gait) {
+        (None, _) => Ok(()),
+        (Some(_), Some(gait)) => Err(GaitError::Value {
+            key: "gait",
+            problem: format!(
+                "{} is not for these {} legs ({}); for them there are {} and stand, or give every leg its [phase]",
+                gait.name(),
+                names.len(),
+                names.join(", "),
+                GaitName::for_legs(names.len()).join(", "),
+            ),
+        }),
+        (Some(leg), None) => Err(GaitError::Value {
+            key: "phase",
+            problem: format!("leg {leg} has none, and no gait says it"),
+        }),
+    }
+}
+
+fn phase_of(description: &GaitDescription, leg: &str) -> Option<f64> {
+    let preset = || description.gait.and_then(|g| g.phase(leg));
+    description.phase.get(leg).copied().or_else(preset)
+}
+
+/// A gait with everything filled in, its frames, and their spline.
+struct Cycle {
+    plan: Plan,
+    file: ClipFile,
+    clip: Clip,
     leg_length_m: f64,
 }
 
-impl Stance {
-    fn new(description: &GaitDescription, model: &RobotModel, legs: &[Leg]) -> Self {
-        let leg_length_m = legs
+/// Foot and body paths of a gait over the ground, in the travelling frame.
+struct Plan {
+    root: RootAdvance,
+    phases: Vec<f64>,
+    neutral: Vec<Point3<f64>>,
+    duty: f64,
+    lift_m: f64,
+    level: [f64; 6],
+    sway_m: f64,
+    sway_roll_rad: f64,
+    bob_m: f64,
+    /// Phase at which the body is farthest to the left, fraction of the cycle.
+    sway_phase: f64,
+}
+
+impl Plan {
+    fn new(
+        description: &GaitDescription,
+        walker: Walker<'_>,
+        stance: &Stance<'_>,
+        kept: f64,
+    ) -> Self {
+        let preset = description.gait.unwrap_or(GaitName::Stand);
+        let still = description.gait == Some(GaitName::Stand);
+        let duty = description
+            .duty_factor
+            .unwrap_or_else(|| preset.duty_factor());
+        let sprawls = walker.legs.iter().any(|l| l.sprawls(walker.facing));
+        let of_leg = |part: f64| {
+            if still {
+                0.0
+            } else {
+                part * stance.leg_length_m
+            }
+        };
+        let default_stride = of_leg(if sprawls { 0.3 } else { 0.5 });
+        let phases: Vec<f64> = walker
+            .legs
             .iter()
-            .map(|l| l.length(model))
-            .fold(f64::INFINITY, f64::min);
-        let hips: Vec<Point3<f64>> = legs.iter().map(|l| l.below_hip(model)).collect();
-        let lowest_hip = hips.iter().map(|h| h.z).fold(f64::INFINITY, f64::min);
-        let body_height_m = description
-            .body_height_m
-            .unwrap_or(0.78 * leg_length_m - lowest_hip);
-        let neutral = hips
-            .iter()
-            .map(|h| Point3::new(h.x, h.y, -body_height_m))
+            .map(|l| phase_of(description, &l.name).unwrap_or(0.0))
             .collect();
         Self {
-            neutral,
-            body_height_m,
-            leg_length_m,
-        }
-    }
-
-    fn cannot(&self, name: &str, source: LegError) -> GaitError {
-        GaitError::Leg {
-            name: name.into(),
-            source,
-            body_height_m: self.body_height_m,
-            leg_length_m: self.leg_length_m,
-        }
-    }
-}
-
-fn empty_file(description: &GaitDescription, model: &RobotModel, kind: ClipKind) -> ClipFile {
-    let origin = if description.origin.is_empty() {
-        format!("authored by handwave clip gait for robot {}", model.name)
-    } else {
-        description.origin.clone()
-    };
-    ClipFile {
-        handwave: "clip".into(),
-        version: 1,
-        name: description.name.clone(),
-        origin,
-        kind,
-        joints: model.joint_names(),
-        frequency_hz: description.frequency_hz.unwrap_or(0.0),
-        duration_s: 0.0,
-        skeleton: None,
-        body: Vec::new(),
-        way: Vec::new(),
-        root: RootAdvance::default(),
-        segments: Vec::new(),
-        frames: Vec::new(),
-    }
-}
-
-fn cycle_clip(
-    description: &GaitDescription,
-    model: &RobotModel,
-    legs: &[Leg],
-    kept: f64,
-) -> Result<ClipFile, GaitError> {
-    let preset = description.gait.unwrap_or(GaitName::Stand);
-    let still = description.gait == Some(GaitName::Stand);
-    let duty = description
-        .duty_factor
-        .unwrap_or_else(|| preset.duty_factor());
-    let stance = Stance::new(description, model, legs);
-    let default_stride = if still {
-        0.0
-    } else {
-        0.5 * stance.leg_length_m
-    };
-    let default_lift = if still {
-        0.0
-    } else {
-        0.12 * stance.leg_length_m
-    };
-    let stride = kept * description.stride_m.unwrap_or(default_stride);
-    let turn = kept * description.turn_rad;
-    let lift = kept * description.step_height_m.unwrap_or(default_lift);
-    let phase_of = |leg: &Leg| {
-        description
-            .phase
-            .get(&leg.name)
-            .copied()
-            .unwrap_or_else(|| preset.phase(&leg.name))
-    };
-    let foot_at = |leg: usize, cycle: f64| {
-        let (sweep, height) = foot_path(cycle - phase_of(&legs[leg]), duty);
-        let neutral = stance.neutral[leg];
-        let turned =
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sweep * duty * turn) * neutral;
-        Point3::new(
-            turned.x + sweep * duty * stride,
-            turned.y,
-            neutral.z + height * lift,
-        )
-    };
-    let mut file = empty_file(description, model, ClipKind::Cycle);
-    file.root = RootAdvance {
-        forward_m: stride,
-        left_m: 0.0,
-        yaw_rad: turn,
-    };
-    file.segments = legs
-        .iter()
-        .map(|leg| Segment {
-            name: leg.name.clone(),
-            joints: leg.joints.iter().map(|j| file.joints[*j].clone()).collect(),
-            phase: phase_of(leg),
+            root: RootAdvance {
+                forward_m: kept * description.stride_m.unwrap_or(default_stride),
+                left_m: kept * description.left_m,
+                yaw_rad: kept * description.turn_rad,
+            },
+            sway_phase: carrying_side(&phases, &stance.neutral, duty),
+            phases,
+            neutral: stance.neutral.clone(),
             duty,
-        })
-        .collect();
-    let mut positions = vec![0.0; file.joints.len()];
-    for (i, leg) in legs.iter().enumerate() {
-        // The knee's side is chosen where the foot stands, so that every clip of the robot agrees.
-        leg.place_foot_from_scratch(model, stance.neutral[i], &mut positions)
-            .map_err(|e| stance.cannot(&description.name, e))?;
-    }
-    for k in 0..CYCLE_FRAMES {
-        for (i, leg) in legs.iter().enumerate() {
-            leg.place_foot(
-                model,
-                foot_at(i, k as f64 / CYCLE_FRAMES as f64),
-                &mut positions,
-            )
-            .map_err(|e| stance.cannot(&description.name, e))?;
+            lift_m: kept * description.step_height_m.unwrap_or(of_leg(0.12)),
+            level: stance.level(),
+            sway_m: kept * description.sway_m,
+            sway_roll_rad: kept * description.sway_roll_rad,
+            bob_m: kept * description.bob_m,
         }
-        file.frames.push(positions.clone());
     }
-    Ok(file)
+
+    /// Where foot `leg` is at `cycle`, travelling frame, z = 0 on the ground.
+    ///
+    /// The travelling frame moves by exp(xi u), with xi the advance of one cycle as a twist of the
+    /// plane. A foot at rest is then exp(-xi u) of where it was: an arc, exactly, when the body turns.
+    fn foot(&self, leg: usize, cycle: f64) -> Point3<f64> {
+        let (sweep, height) = foot_path(cycle - self.phases[leg], self.duty);
+        let neutral = self.neutral[leg];
+        let at = advance(&self.root, sweep * self.duty) * Point2::new(neutral.x, neutral.y);
+        Point3::new(at.x, at.y, height * self.lift_m)
+    }
+
+    /// Place of the body at `cycle`, travelling frame.
+    fn body(&self, cycle: f64) -> [f64; 6] {
+        let mut body = self.level;
+        let sway = (TAU * (cycle - self.sway_phase)).cos();
+        body[1] += self.sway_m * sway;
+        body[2] += self.bob_m * (2.0 * TAU * (cycle - self.sway_phase)).cos();
+        body[3] -= self.sway_roll_rad * sway;
+        body
+    }
+}
+
+/// Pose in the plane after `part` of the advance of a cycle, moving steadily: exp of the twist.
+fn advance(root: &RootAdvance, part: f64) -> Isometry2<f64> {
+    let (x, y, angle) = (
+        root.forward_m * part,
+        root.left_m * part,
+        root.yaw_rad * part,
+    );
+    // sin(a)/a and (1 - cos(a))/a.
+    let (s, c) = if angle.abs() < 1e-6 {
+        (1.0, 0.5 * angle)
+    } else {
+        (angle.sin() / angle, (1.0 - angle.cos()) / angle)
+    };
+    Isometry2::new(Vector2::new(s * x - c * y, c * x + s * y), angle)
+}
+
+/// Phase at which the left side carries most: the first harmonic of the feet on the ground, left
+/// counted positive. Where that is nothing (a trot), mid-stance of the first leg.
+fn carrying_side(phases: &[f64], neutral: &[Point3<f64>], duty: f64) -> f64 {
+    let (mut cos, mut sin) = (0.0, 0.0);
+    for (phase, foot) in phases.iter().zip(neutral) {
+        let angle = TAU * (phase + 0.5 * duty);
+        cos += foot.y.signum() * angle.cos();
+        sin += foot.y.signum() * angle.sin();
+    }
+    if cos.hypot(sin) < 1e-6 {
+        return phases.first().map_or(0.0, |p| p + 0.5 * duty);
+    }
+    sin.atan2(cos) / TAU
+}
+
+impl Cycle {
+    fn new(
+        description: &GaitDescription,
+        walker: Walker<'_>,
+        kept: f64,
+        frames: usize,
+    ) -> Result<Self, GaitError> {
+        let stance = Stance::new(description, walker);
+        let plan = Plan::new(description, walker, &stance, kept);
+        let mut file = stance.empty_file(description, ClipKind::Cycle);
+        file.root = plan.root;
+        file.segments = walker
+            .legs
+            .iter()
+            .zip(&plan.phases)
+            .map(|(leg, phase)| Segment {
+                name: leg.name.clone(),
+                joints: leg.joints.iter().map(|j| file.joints[*j].clone()).collect(),
+                phase: *phase,
+                duty: plan.duty,
+            })
+            .collect();
+        let mut positions = stance.stand()?;
+        for k in 0..frames {
+            let u = k as f64 / frames as f64;
+            let root = stance.root_pose(&plan.body(u));
+            for leg in 0..walker.legs.len() {
+                stance.place(leg, &root, plan.foot(leg, u), &mut positions)?;
+            }
+            file.frames.push(positions.clone());
+            file.body.push(Stance::body_row(&root));
+        }
+        let clip = file.for_body(&file.joints).map_err(|e| GaitError::Value {
+            key: "name",
+            problem: e.to_string(),
+        })?;
+        Ok(Self {
+            plan,
+            file,
+            clip,
+            leg_length_m: stance.leg_length_m,
+        })
+    }
+
+    /// Farthest that a foot in stance is from where it should be, between the frames too, metres.
+    fn stance_error_m(&self, walker: Walker<'_>) -> f64 {
+        let samples = 4 * self.file.frames.len();
+        let mut pose = vec![0.0; self.file.joints.len()];
+        let mut worst: f64 = 0.0;
+        let facing = walker.facing.rotation();
+        for k in 0..samples {
+            let u = k as f64 / samples as f64;
+            self.clip.pose(u, &mut pose);
+            let [x, y, z, roll, pitch, yaw] = self.plan.body(u);
+            let root = nalgebra::Isometry3::from_parts(
+                nalgebra::Translation3::new(x, y, z),
+                nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw) * facing,
+            );
+            for (i, leg) in walker.legs.iter().enumerate() {
+                if (u - self.plan.phases[i]).rem_euclid(1.0) < self.plan.duty {
+                    let foot = root * leg.foot_position(walker.model, &pose);
+                    worst = worst.max((foot - self.plan.foot(i, u)).norm());
+                }
+            }
+        }
+        worst
+    }
 }
 
 /// Foot path at `cycle` (fraction since touch-down): sweep in -0.5..0.5 of the stance way (front is
@@ -264,62 +363,6 @@ fn foot_path(cycle: f64, duty: f64) -> (f64, f64) {
     let sweep = -0.5 - drift * w + (1.0 + drift) * ease(w);
     let bump = w * (1.0 - w);
     (sweep, 64.0 * bump * bump * bump)
-}
-
-fn path_clip(
-    description: &GaitDescription,
-    model: &RobotModel,
-    legs: &[Leg],
-) -> Result<ClipFile, GaitError> {
-    let stance = Stance::new(description, model, legs);
-    let mut file = empty_file(description, model, ClipKind::Path);
-    let mut positions = vec![0.0; file.joints.len()];
-    let steps = description.pose.len() - 1;
-    let frames = (PATH_FRAMES - 1) * steps + 1;
-    for k in 0..frames {
-        let along = k as f64 / (PATH_FRAMES - 1) as f64;
-        let from = (along as usize).min(steps - 1);
-        let w = ease(along - from as f64);
-        let body = body_at(
-            &description.pose[from],
-            &description.pose[from + 1],
-            w,
-            &stance,
-        );
-        for (leg, neutral) in legs.iter().zip(&stance.neutral) {
-            let ground = Point3::new(neutral.x, neutral.y, 0.0);
-            let foot = body.inverse_transform_point(&ground);
-            if k == 0 {
-                leg.place_foot_from_scratch(model, *neutral, &mut positions)
-                    .map_err(|e| stance.cannot(&description.name, e))?;
-            }
-            leg.place_foot(model, foot, &mut positions)
-                .map_err(|e| stance.cannot(&description.name, e))?;
-        }
-        file.frames.push(positions.clone());
-    }
-    Ok(file)
-}
-
-/// Pose of the body over the ground between two poses.
-fn body_at(a: &BodyPose, b: &BodyPose, w: f64, stance: &Stance) -> Isometry3<f64> {
-    let mix = |x: f64, y: f64| x + w * (y - x);
-    let height = mix(
-        a.body_height_m.unwrap_or(stance.body_height_m),
-        b.body_height_m.unwrap_or(stance.body_height_m),
-    );
-    Isometry3::from_parts(
-        Translation3::new(
-            mix(a.forward_m, b.forward_m),
-            mix(a.left_m, b.left_m),
-            height,
-        ),
-        UnitQuaternion::from_euler_angles(
-            mix(a.roll_rad, b.roll_rad),
-            mix(a.pitch_rad, b.pitch_rad),
-            mix(a.yaw_rad, b.yaw_rad),
-        ),
-    )
 }
 
 /// Positions at which a clip leaves the joint limits, for the report of `clip gait`.
@@ -345,6 +388,8 @@ pub fn outside_limits(clip: &Clip, model: &RobotModel) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::range::JointRange;
+    use crate::robot::Leg;
 
     const PUP: &str = include_str!("../../configs/robots/pup.urdf");
 
@@ -360,6 +405,23 @@ mod tests {
             })
             .collect();
         (model, legs, ranges)
+    }
+
+    fn author(
+        description: &GaitDescription,
+        model: &RobotModel,
+        legs: &[Leg],
+        ranges: &[JointRange],
+        strict: bool,
+    ) -> Result<Authored, GaitError> {
+        let facing = Leg::facing(model, legs);
+        let walker = Walker {
+            model,
+            legs,
+            facing,
+            ranges,
+        };
+        super::author(description, walker, strict)
     }
 
     #[test]

@@ -4,8 +4,15 @@
 //! 0.2, succeeds when that of the source class has fallen below 0.2, and is aborted when the target's
 //! sinks below 0.1; the blend takes half a second. The thesis blends linearly; a linear weight steps
 //! the joints' speed at both ends, so the weight here is eased over the same time.
+//!
+//! A class without an edge from the present one is reached through others. A class may say when it can
+//! be left; until then the wish waits. A transition whose target was given up for a third class is
+//! interrupted: the third class is entered at once, and what that leaves of a jump is faded by the animator.
+
+mod routes;
 
 use super::smooth::ease;
+pub use routes::Routes;
 
 /// Thresholds and times of the graph.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -16,7 +23,7 @@ pub struct GraphOptions {
     pub abort: f64,
     /// Activation of the source class below which a transition succeeds (0.2).
     pub release: f64,
-    /// Length of a blend, seconds (0.5).
+    /// Least length of a blend, seconds (0.5).
     pub blend_s: f64,
     /// After this long with no gesture performed the start class is played again, seconds.
     pub idle_s: f64,
@@ -34,6 +41,62 @@ impl Default for GraphOptions {
     }
 }
 
+/// What a class asks for in one step.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct Ask {
+    /// How much its gesture asks for it, 0..1.
+    pub activation: f64,
+    /// It is at a point where it may be left.
+    pub may_leave: bool,
+    /// It has played to its end and waits to be left.
+    pub done: bool,
+}
+
+impl Ask {
+    /// A class that can be left at any time.
+    pub fn with(activation: f64) -> Self {
+        Self {
+            activation,
+            may_leave: true,
+            done: false,
+        }
+    }
+}
+
+/// How a transition between two classes is to be made.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub enum Plan {
+    /// Both classes play; the weight moves over in this time, seconds.
+    Blend {
+        /// Least length of the blend that the joints allow, seconds.
+        span_s: f64,
+    },
+    /// The source plays on for this time, then the target is entered at once.
+    Jump {
+        /// Until the jump, seconds.
+        wait_s: f64,
+    },
+    /// Nothing in the target is like the source now: stay.
+    Refuse,
+}
+
+/// What happened in a step that the animator must act on.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// Nothing but the passing of time.
+    None,
+    /// A transition began.
+    Began {
+        /// The class being entered.
+        to: usize,
+    },
+    /// The class `to` is played from now on, without a blend.
+    Jumped {
+        /// The new class.
+        to: usize,
+    },
+}
+
 /// A transition in progress.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub struct Transition {
@@ -41,23 +104,34 @@ pub struct Transition {
     pub from: usize,
     /// Class being entered.
     pub to: usize,
+    /// Class that the way leads to in the end; `to` when there is a direct edge.
+    pub goal: usize,
     /// Time along the blend, seconds; goes back when aborted.
     pub along_s: f64,
+    /// Length of the blend, seconds.
+    pub span_s: f64,
     /// The target's gesture was given up: the blend runs backwards.
     pub aborting: bool,
+    /// Time until the target is entered at once, seconds; `None`: a blend.
+    pub jump_in_s: Option<f64>,
+    /// How fast the blend goes on, -1 (backwards) to 1.
+    rate: f64,
 }
 
 /// The graph and where in it the puppet is.
 #[derive(Clone, Debug)]
 pub struct Graph {
     options: GraphOptions,
-    /// Nodes x nodes: is there an edge.
-    edges: Vec<bool>,
+    routes: Routes,
     nodes: usize,
     start: usize,
     active: usize,
     transition: Option<Transition>,
+    /// A class that waits until the active one may be left.
+    queued: Option<usize>,
     idle_for_s: f64,
+    /// After a refusal nothing is planned for this long, seconds.
+    refused_for_s: f64,
     counts: TransitionCounts,
 }
 
@@ -68,31 +142,36 @@ pub struct TransitionCounts {
     pub completed: u32,
     /// Started and given up.
     pub aborted: u32,
+    /// Broken off for a third class.
+    pub interrupted: u32,
+    /// Not begun, since nothing in the target was like the source.
+    pub refused: u32,
 }
 
+/// A blend that turns round does so in this time, seconds: its speed must not step.
+const TURN_S: f64 = 0.15;
+/// After a refusal the next plan is made so much later, seconds.
+const REFUSED_S: f64 = 0.1;
+
 impl Graph {
-    /// A graph of `nodes` classes. `edges` are (from, to) pairs; out-of-range ones are ignored.
+    /// A graph of `nodes` classes. `edges` are (from, to, cost): the cost of a way decides where it leads
+    /// through; out-of-range ones are left out.
     pub fn new(
         nodes: usize,
         start: usize,
-        edges: &[(usize, usize)],
+        edges: &[(usize, usize, f64)],
         options: GraphOptions,
     ) -> Self {
-        let mut matrix = vec![false; nodes * nodes];
-        for (from, to) in edges
-            .iter()
-            .filter(|(f, t)| *f < nodes && *t < nodes && f != t)
-        {
-            matrix[from * nodes + to] = true;
-        }
         Self {
             options,
-            edges: matrix,
+            routes: Routes::new(nodes, edges),
             nodes,
             start,
             active: start,
             transition: None,
+            queued: None,
             idle_for_s: 0.0,
+            refused_for_s: 0.0,
             counts: TransitionCounts::default(),
         }
     }
@@ -107,10 +186,19 @@ impl Graph {
         self.transition
     }
 
+    /// A class that was asked for and waits until the active one may be left.
+    pub fn queued(&self) -> Option<usize> {
+        self.queued
+    }
+
+    /// Least length of a blend, seconds.
+    pub fn blend_s(&self) -> f64 {
+        self.options.blend_s
+    }
+
     /// Weight of the transition's target, 0..1, eased.
     pub fn blend(&self) -> f64 {
-        self.transition
-            .map_or(0.0, |t| ease(t.along_s / self.options.blend_s))
+        self.transition.map_or(0.0, |t| ease(t.along_s / t.span_s))
     }
 
     /// Transitions so far.
@@ -118,124 +206,187 @@ impl Graph {
         self.counts
     }
 
-    /// One step: `activation` holds each class's gesture amplitude or progression.
-    pub fn step(&mut self, activation: &[f64], dt_s: f64) {
-        match self.transition {
-            Some(transition) => self.go_on(transition, activation, dt_s),
-            None => self.look_out(activation, dt_s),
-        }
-    }
-
-    fn look_out(&mut self, activation: &[f64], dt_s: f64) {
-        let mut best: Option<usize> = None;
-        for to in 0..self.nodes {
-            if self.edges[self.active * self.nodes + to]
-                && activation[to] > self.options.rise
-                && best.is_none_or(|b| activation[to] > activation[b])
-            {
-                best = Some(to);
-            }
-        }
-        // While the active class is performed it is left only for a stronger one.
-        let best = best.filter(|to| {
-            activation[self.active] < self.options.release
-                || activation[*to] > activation[self.active]
-        });
-        let idle = activation.iter().all(|a| !(*a > self.options.abort));
+    /// One step: `asks` holds what each class asks for; `plan(from, to)` says how a transition is to be
+    /// made. Allocates nothing.
+    pub fn step(
+        &mut self,
+        asks: &[Ask],
+        dt_s: f64,
+        plan: &mut dyn FnMut(usize, usize) -> Plan,
+    ) -> Event {
+        let idle = asks.iter().all(|a| !(a.activation > self.options.abort));
         self.idle_for_s = if idle { self.idle_for_s + dt_s } else { 0.0 };
-        let target = best.or_else(|| {
-            (self.active != self.start && self.idle_for_s > self.options.idle_s)
-                .then_some(self.start)
-        });
-        if let Some(to) = target {
-            self.transition = Some(Transition {
-                from: self.active,
-                to,
-                along_s: 0.0,
-                aborting: false,
-            });
+        self.refused_for_s = (self.refused_for_s - dt_s).max(0.0);
+        match self.transition {
+            Some(transition) => self.go_on(transition, asks, dt_s, plan),
+            None => self.look_out(asks, plan),
         }
     }
 
-    fn go_on(&mut self, mut transition: Transition, activation: &[f64], dt_s: f64) {
-        let to_idle = transition.to == self.start && self.idle_for_s > self.options.idle_s;
-        if !to_idle && activation[transition.to] < self.options.abort {
+    /// Is there a way from the active class to `to`.
+    fn reaches(&self, to: usize) -> bool {
+        self.routes.next(self.active, to).is_some()
+    }
+
+    /// The class that is most asked for among those that `allowed` lets through.
+    fn strongest(&self, asks: &[Ask], allowed: impl Fn(usize) -> bool) -> Option<usize> {
+        (0..self.nodes)
+            .filter(|to| asks[*to].activation > self.options.rise && allowed(*to))
+            .max_by(|a, b| {
+                let (x, y) = (asks[*a].activation, asks[*b].activation);
+                // The first of equals, as classes are listed.
+                x.total_cmp(&y).then(b.cmp(a))
+            })
+    }
+
+    fn look_out(&mut self, asks: &[Ask], plan: &mut dyn FnMut(usize, usize) -> Plan) -> Event {
+        let here = asks[self.active];
+        // While the active class is performed it is left only for a stronger one.
+        let best = self.strongest(asks, |to| self.reaches(to)).filter(|to| {
+            here.done
+                || here.activation < self.options.release
+                || asks[*to].activation > here.activation
+        });
+        let back = self.active != self.start
+            && self.reaches(self.start)
+            && (here.done || self.idle_for_s > self.options.idle_s);
+        let goal = best.or_else(|| back.then_some(self.start));
+        self.queued = goal.filter(|_| !here.may_leave);
+        match goal {
+            Some(goal) if here.may_leave => self.begin(goal, plan),
+            _ => Event::None,
+        }
+    }
+
+    /// Starts the way to `goal`.
+    fn begin(&mut self, goal: usize, plan: &mut dyn FnMut(usize, usize) -> Plan) -> Event {
+        if self.refused_for_s > 0.0 {
+            return Event::None;
+        }
+        let Some(to) = self.routes.next(self.active, goal) else {
+            return Event::None;
+        };
+        let (span_s, jump_in_s) = match plan(self.active, to) {
+            Plan::Blend { span_s } => (span_s.max(self.options.blend_s), None),
+            Plan::Jump { wait_s } => (self.options.blend_s, Some(wait_s)),
+            Plan::Refuse => {
+                self.counts.refused += 1;
+                self.refused_for_s = REFUSED_S;
+                return Event::None;
+            }
+        };
+        self.transition = Some(Transition {
+            from: self.active,
+            to,
+            goal,
+            along_s: 0.0,
+            span_s,
+            aborting: false,
+            jump_in_s,
+            rate: 1.0,
+        });
+        Event::Began { to }
+    }
+
+    fn go_on(
+        &mut self,
+        mut transition: Transition,
+        asks: &[Ask],
+        dt_s: f64,
+        plan: &mut dyn FnMut(usize, usize) -> Plan,
+    ) -> Event {
+        let asked = asks[transition.goal].activation;
+        let to_start = transition.goal == self.start
+            && (self.idle_for_s > self.options.idle_s || asks[transition.from].done);
+        if !to_start && asked < self.options.abort {
             transition.aborting = true;
-        } else if activation[transition.to] > self.options.rise {
+        } else if asked > self.options.rise {
             transition.aborting = false;
         }
-        let step = if transition.aborting { -dt_s } else { dt_s };
-        transition.along_s = (transition.along_s + step).clamp(0.0, self.options.blend_s);
+        if let Some(wait_s) = transition.jump_in_s {
+            return self.wait(transition, wait_s - dt_s);
+        }
+        if let Some(event) = self.interrupt(&transition, asks) {
+            return event;
+        }
+        // The joints may need longer than they seemed to when the blend began.
+        if let Plan::Blend { span_s } = plan(transition.from, transition.to)
+            && span_s > transition.span_s
+        {
+            transition.along_s *= span_s / transition.span_s;
+            transition.span_s = span_s;
+        }
+        let towards = if transition.aborting { -1.0 } else { 1.0 };
+        let turn = 2.0 * dt_s / TURN_S;
+        transition.rate += (towards - transition.rate).clamp(-turn, turn);
+        transition.along_s =
+            (transition.along_s + transition.rate * dt_s).clamp(0.0, transition.span_s);
         self.transition = Some(transition);
         if transition.aborting && transition.along_s <= 0.0 {
             self.transition = None;
             self.counts.aborted += 1;
         } else if !transition.aborting
-            && transition.along_s >= self.options.blend_s
-            && (to_idle || activation[transition.from] < self.options.release)
+            && transition.along_s >= transition.span_s
+            && (to_start
+                || transition.to != transition.goal
+                || asks[transition.from].done
+                || asks[transition.from].activation < self.options.release)
         {
-            self.active = transition.to;
-            self.transition = None;
-            self.idle_for_s = 0.0;
-            self.counts.completed += 1;
+            self.arrive(transition);
         }
+        Event::None
+    }
+
+    /// Plays the source until its jump; a wish that was given up before it is forgotten.
+    fn wait(&mut self, mut transition: Transition, left_s: f64) -> Event {
+        if transition.aborting {
+            self.transition = None;
+            self.counts.aborted += 1;
+            return Event::None;
+        }
+        if left_s > 0.0 {
+            transition.jump_in_s = Some(left_s);
+            self.transition = Some(transition);
+            return Event::None;
+        }
+        self.arrive(transition);
+        Event::Jumped { to: transition.to }
+    }
+
+    /// A third class is asked for while the target is given up: enter it at once.
+    fn interrupt(&mut self, transition: &Transition, asks: &[Ask]) -> Option<Event> {
+        if !transition.aborting {
+            return None;
+        }
+        let others = |to: usize| to != transition.from && to != transition.to;
+        let third = self.strongest(asks, |to| others(to) && self.reaches(to))?;
+        // From whichever of the two shows more.
+        let shown = if self.blend() > 0.5 {
+            transition.to
+        } else {
+            transition.from
+        };
+        let to = self.routes.next(shown, third)?;
+        self.transition = None;
+        self.counts.interrupted += 1;
+        if to == self.active {
+            return None;
+        }
+        self.active = to;
+        Some(Event::Jumped { to })
+    }
+
+    fn arrive(&mut self, transition: Transition) {
+        self.active = transition.to;
+        self.transition = None;
+        self.idle_for_s = if transition.to == transition.goal {
+            0.0
+        } else {
+            self.idle_for_s
+        };
+        self.counts.completed += 1;
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const DT: f64 = 0.005;
-
-    fn graph() -> Graph {
-        Graph::new(2, 0, &[(0, 1), (1, 0)], GraphOptions::default())
-    }
-
-    fn run(graph: &mut Graph, activation: [f64; 2], seconds: f64) {
-        for _ in 0..(seconds / DT).round() as usize {
-            graph.step(&activation, DT);
-        }
-    }
-
-    #[test]
-    fn a_transition_starts_above_the_threshold_and_takes_half_a_second() {
-        let mut g = graph();
-        run(&mut g, [0.0, 0.19], 1.0);
-        assert_eq!((g.active(), g.transition()), (0, None));
-        run(&mut g, [0.0, 0.21], 0.45);
-        assert!(g.transition().is_some_and(|t| t.to == 1));
-        assert!(g.blend() > 0.9, "blend {}", g.blend());
-        run(&mut g, [0.0, 0.21], 0.1);
-        assert_eq!((g.active(), g.transition()), (1, None));
-        assert_eq!(
-            g.counts(),
-            TransitionCounts {
-                completed: 1,
-                aborted: 0
-            }
-        );
-    }
-
-    #[test]
-    fn it_waits_for_the_source_and_is_aborted_when_the_target_sinks() {
-        let mut g = graph();
-        run(&mut g, [0.3, 0.8], 2.0);
-        assert_eq!(g.active(), 0, "the source gesture is still performed");
-        assert!((g.blend() - 1.0).abs() < 1e-9, "blend {}", g.blend());
-        run(&mut g, [0.3, 0.05], 0.6);
-        assert_eq!((g.active(), g.transition()), (0, None));
-        assert_eq!(g.counts().aborted, 1);
-    }
-
-    #[test]
-    fn with_nothing_performed_the_start_class_comes_back() {
-        let mut g = graph();
-        run(&mut g, [0.0, 1.0], 1.0);
-        assert_eq!(g.active(), 1);
-        run(&mut g, [0.0, 0.0], 1.7);
-        assert_eq!(g.active(), 0);
-        run(&mut g, [f64::NAN, f64::NAN], 3.0);
-        assert_eq!(g.active(), 0, "not-a-number must not activate anything");
-    }
-}
+mod tests;

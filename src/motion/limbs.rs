@@ -1,31 +1,46 @@
-//! Limb timelines of a class: which joints belong to which limb, and each clip's offset per limb.
+//! Limb timelines of a class: which coordinates belong to which limb, and each clip's offset per limb.
 
 use super::class::ClassError;
 use super::clip::Clip;
 use crate::base::angle::wrap_pi;
 use std::f64::consts::TAU;
 
-/// Limb of each joint, and per clip the offset of every limb's timeline against the reference.
-///
-/// The reference is the slowest moving clip (the longest); offsets are brought into half a turn of it.
-pub(super) type Timelines = (Vec<Option<usize>>, Vec<Option<Vec<f64>>>);
+/// Limbs of a class and their timelines.
+pub(super) struct Timelines {
+    /// Limb names.
+    pub(super) limbs: Vec<String>,
+    /// Limb of each coordinate.
+    pub(super) limb_of: Vec<Option<usize>>,
+    /// Per clip the offset of every limb's timeline against the reference, rad; brought into half a turn of
+    /// it. `None` for a clip whose limbs do not move.
+    pub(super) offsets: Vec<Option<Vec<f64>>>,
+}
 
-/// The timelines of `clips`, with the limbs of the reference.
+/// The timelines of `clips`, with the limbs of the reference: the slowest moving clip (the longest).
 pub(super) fn timelines(
     class: &str,
     clips: &[&Clip],
-    joints: usize,
+    coordinates: usize,
 ) -> Result<Timelines, ClassError> {
-    let moves = |clip: &Clip| !clip.limbs.is_empty() && clip.limbs.iter().any(|l| l.duty < 1.0);
-    let reference = clips
-        .iter()
-        .filter(|c| moves(c))
-        .min_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    let mut limb_of = vec![None; joints];
-    let Some(reference) = reference else {
-        return Ok((limb_of, vec![None; clips.len()]));
+    let moves = |clip: &Clip| clip.limbs.iter().any(|l| l.duty < 1.0);
+    let slowest = |clips: &mut dyn Iterator<Item = &'_ &'_ Clip>| {
+        clips
+            .min_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz))
+            .map(|c| c.limbs.clone())
     };
-    for (i, limb) in reference.limbs.iter().enumerate() {
+    let moving = slowest(&mut clips.iter().filter(|c| moves(c)));
+    let reference = moving
+        .clone()
+        .or_else(|| slowest(&mut clips.iter().filter(|c| !c.limbs.is_empty())));
+    let mut limb_of = vec![None; coordinates];
+    let Some(reference) = reference else {
+        return Ok(Timelines {
+            limbs: Vec::new(),
+            limb_of,
+            offsets: vec![None; clips.len()],
+        });
+    };
+    for (i, limb) in reference.iter().enumerate() {
         for coordinate in &limb.coordinates {
             limb_of[*coordinate] = Some(i);
         }
@@ -37,7 +52,6 @@ pub(super) fn timelines(
                 return Ok(None);
             }
             reference
-                .limbs
                 .iter()
                 .map(|wanted| {
                     clip.limbs
@@ -54,5 +68,9 @@ pub(super) fn timelines(
                 .map(Some)
         })
         .collect::<Result<_, _>>()?;
-    Ok((limb_of, offsets))
+    Ok(Timelines {
+        limbs: reference.into_iter().map(|l| l.name).collect(),
+        limb_of,
+        offsets,
+    })
 }

@@ -34,18 +34,68 @@ impl Node {
     pub fn rest_pose(&mut self, space: &dyn PoseSpace, out: &mut [f64]) {
         match self {
             Node::Clips(class) => class.rest_pose(space, out),
-            Node::Direct(class) => class.rest_pose(out),
+            Node::Direct(class) => {
+                space.rest(out);
+                class.rest_pose(&mut out[..class.map().joints()]);
+            }
+        }
+    }
+
+    /// Index of the limb `name` among those with timelines of their own.
+    pub fn limb(&self, name: &str) -> Option<usize> {
+        match self {
+            Node::Clips(class) => class.limbs().iter().position(|l| l == name),
+            Node::Direct(_) => None,
+        }
+    }
+
+    /// How much of the motion has limb `limb` on the ground, 0..1.
+    pub(super) fn contact(&self, limb: usize) -> f64 {
+        match self {
+            Node::Clips(class) => class.contact(limb),
+            Node::Direct(_) => f64::NAN,
+        }
+    }
+
+    /// The same for limbs that the class does not know: it stands on them, or cannot tell.
+    pub(super) fn stands(&self) -> f64 {
+        match self {
+            Node::Clips(class) if class.limbs().is_empty() => 1.0,
+            _ => f64::NAN,
+        }
+    }
+
+    /// Whether the class may be left now.
+    pub(super) fn may_leave(&self) -> bool {
+        match self {
+            Node::Clips(class) => class.may_leave(),
+            Node::Direct(_) => true,
+        }
+    }
+
+    /// Whether it has played to its end.
+    pub(super) fn done(&self) -> bool {
+        match self {
+            Node::Clips(class) => class.done(),
+            Node::Direct(_) => false,
+        }
+    }
+
+    /// Tells the node whether it shows.
+    pub(super) fn show(&mut self, shown: bool, drive: &Drive) {
+        if let Node::Clips(class) = self {
+            class.show(shown, drive);
         }
     }
 
     /// How much `drive` asks for this node, for the graph.
     pub(super) fn activation(&self, drive: &Drive) -> f64 {
         match self {
+            Node::Clips(class) => class.activation(drive),
             // Played while nothing else is: it asks for nothing itself.
             Node::Direct(class) if class.always => 0.0,
-            // A gesture in the opposite sense does not activate the class.
-            _ if drive.frequency_hz < 0.0 => 0.0,
-            _ => drive.amplitude,
+            Node::Direct(_) if drive.frequency_hz < 0.0 => 0.0,
+            Node::Direct(_) => drive.amplitude,
         }
     }
 
@@ -59,7 +109,11 @@ impl Node {
     ) -> Played {
         match self {
             Node::Clips(class) => class.step(space, drive, dt_s, out),
-            Node::Direct(class) => class.step(dt_s, out),
+            Node::Direct(class) => {
+                space.rest(out);
+                let joints = class.map().joints();
+                class.step(dt_s, &mut out[..joints])
+            }
         }
     }
 }

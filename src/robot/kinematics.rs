@@ -45,11 +45,11 @@ impl RobotModel {
     /// Pose of the child link of joint `j` in its parent link's frame.
     pub fn joint_transform(&self, j: usize, positions: &[f64]) -> Isometry3<f64> {
         let joint = &self.joints[j];
+        let (driver, multiplier, offset) = self.driver(j);
         let position = self
-            .actuated_index(j)
+            .actuated_index(driver)
             .and_then(|i| positions.get(i))
-            .copied()
-            .unwrap_or(0.0);
+            .map_or(0.0, |q| multiplier * q + offset);
         let motion = match joint.kind {
             JointKind::Fixed => Isometry3::identity(),
             JointKind::Revolute => Isometry3::from_parts(

@@ -3,13 +3,15 @@
 //! [`model`] reads and checks a URDF, [`kinematics`] places its links, [`leg`] finds legs and
 //! solves them, [`ik`] solves any other chain, [`envelope`] is the last thing every target passes before it leaves.
 
+pub mod adapt;
 pub mod envelope;
 pub mod ik;
 pub mod kinematics;
 pub mod leg;
 pub mod model;
+pub mod tip;
 
 pub use envelope::{Envelope, JointEnvelope};
 pub use ik::ChainIk;
-pub use leg::Leg;
+pub use leg::{Facing, Leg};
 pub use model::{JointLimits, ModelError, RobotModel};

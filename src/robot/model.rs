@@ -1,6 +1,7 @@
 //! A robot read from a URDF and checked: tree, joints, limits.
 
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use super::tip::{MeshShape, shapes};
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::HashMap;
 
 /// What a joint may do, in radians and seconds (metres for prismatic joints).
@@ -42,6 +43,19 @@ pub struct Joint {
     pub axis: Unit<Vector3<f64>>,
     /// Limits; present on every joint that moves.
     pub limits: Option<JointLimits>,
+    /// Set on a joint that has no drive of its own.
+    pub mimic: Option<Mimic>,
+}
+
+/// A joint that follows another: position = multiplier * other + offset.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct Mimic {
+    /// The joint it follows, as an index into the joints.
+    pub joint: usize,
+    /// See above.
+    pub multiplier: f64,
+    /// See above, rad (m for prismatic joints).
+    pub offset: f64,
 }
 
 /// A robot: links in a tree of joints.
@@ -53,12 +67,16 @@ pub struct RobotModel {
     pub links: Vec<String>,
     /// All joints, in the order of the URDF.
     pub joints: Vec<Joint>,
-    /// Indices into `joints` of those that move, in the order of the URDF.
+    /// Indices into `joints` of those that move by a drive of their own, in the order of the URDF.
     pub actuated: Vec<usize>,
     /// Index of the root link.
     pub root: usize,
     /// Per link the joint above it; `None` for the root.
     pub parent_joint: Vec<Option<usize>>,
+    /// Per link the far end of its shape (box, cylinder, sphere; meshes by
+    /// [`RobotModel::read_mesh_tips`]) from its origin, in its frame; `None` without a shape.
+    pub tips: Vec<Option<Point3<f64>>>,
+    pub(super) meshes: Vec<MeshShape>,
     /// What is odd but not wrong, for the reader.
     pub warnings: Vec<String>,
     /// Joints from the root outwards.
@@ -104,12 +122,19 @@ pub enum ModelError {
 }
 
 /// Beyond this a limit is a placeholder, not a servo's: 100 turns a second.
-const ABSURD_VELOCITY_RAD_S: f64 = 628.0;
+pub const ABSURD_VELOCITY_RAD_S: f64 = 628.0;
+/// A revolute joint with more room than this is not kept off anything by its limits: one turn.
+const ODD_SPAN_RAD: f64 = 6.3;
 
 impl RobotModel {
     /// Reads a URDF and checks what the format leaves open: one tree, known links, finite numbers,
     /// usable axes and limits.
     pub fn from_urdf(text: &str) -> Result<Self, ModelError> {
+        if has_macros(text) {
+            return Err(ModelError::Parse(
+                "this is a xacro; expand it first: `xacro FILE.xacro > robot.urdf`".into(),
+            ));
+        }
         let urdf = urdf_rs::read_from_string(text).map_err(|e| ModelError::Parse(e.to_string()))?;
         let links: Vec<String> = urdf.links.iter().map(|l| l.name.clone()).collect();
         let index: HashMap<&str, usize> = links
@@ -180,9 +205,16 @@ impl RobotModel {
                 )));
             }
         }
+        for (j, joint) in urdf.joints.iter().enumerate() {
+            if let Some(mimic) = &joint.mimic {
+                let of = urdf.joints.iter().position(|o| o.name == mimic.joint);
+                joints[j].mimic = Some(convert_mimic(joint, mimic, of, &urdf.joints)?);
+            }
+        }
         let actuated: Vec<usize> = (0..joints.len())
-            .filter(|j| joints[*j].kind != JointKind::Fixed)
+            .filter(|j| joints[*j].kind != JointKind::Fixed && joints[*j].mimic.is_none())
             .collect();
+        let (tips, meshes) = shapes(&urdf);
         let names: std::collections::HashSet<&str> =
             joints.iter().map(|j| j.name.as_str()).collect();
         if names.len() != joints.len() {
@@ -215,6 +247,8 @@ impl RobotModel {
             actuated,
             root,
             parent_joint,
+            tips,
+            meshes,
             warnings,
         })
     }
@@ -239,6 +273,78 @@ impl RobotModel {
             .collect()
     }
 
+    /// What drives joint `joint`: the joint with the drive, and multiplier and offset of its position.
+    pub fn driver(&self, joint: usize) -> (usize, f64, f64) {
+        match self.joints[joint].mimic {
+            Some(m) => (m.joint, m.multiplier, m.offset),
+            None => (joint, 1.0, 0.0),
+        }
+    }
+
+    /// Joints that move whose velocity limit is a placeholder.
+    pub fn placeholder_velocities(&self) -> Vec<&Joint> {
+        self.actuated
+            .iter()
+            .map(|j| &self.joints[*j])
+            .filter(|j| j.limits.is_some_and(|l| l.velocity > ABSURD_VELOCITY_RAD_S))
+            .collect()
+    }
+
+    /// Turning joints whose position limits leave more than a turn, so that they keep it off nothing.
+    pub fn wide_ranges(&self) -> Vec<&Joint> {
+        self.actuated
+            .iter()
+            .map(|j| &self.joints[*j])
+            .filter(|j| {
+                let span = j.limits.map_or(0.0, |l| l.upper - l.lower);
+                j.kind == JointKind::Revolute && span > ODD_SPAN_RAD
+            })
+            .collect()
+    }
+
+    /// No joint may be faster than `velocity` (rad/s, above 0).
+    pub fn cap_velocity(&mut self, velocity: f64) {
+        for limits in self.joints.iter_mut().filter_map(|j| j.limits.as_mut()) {
+            limits.velocity = limits.velocity.min(velocity);
+        }
+    }
+
+    /// Gives joint `name` other position limits. Legs found before keep the old ones.
+    pub fn set_range(&mut self, name: &str, lower: f64, upper: f64) -> Result<(), ModelError> {
+        let bad = |problem: String| ModelError::Joint {
+            joint: name.into(),
+            problem,
+        };
+        // Written so that NaN fails.
+        if !(lower < upper) {
+            return Err(bad(format!(
+                "limits {lower}..{upper} leave no room to move"
+            )));
+        }
+        let moving = self.joint_names();
+        let limits = self
+            .joints
+            .iter_mut()
+            .find(|j| j.name == name)
+            .and_then(|j| j.limits.as_mut());
+        let limits = limits.ok_or_else(|| {
+            bad(format!(
+                "is not a joint that moves; those are {}",
+                moving.join(", ")
+            ))
+        })?;
+        (limits.lower, limits.upper) = (lower, upper);
+        Ok(())
+    }
+
+    /// Positions nearest to zero that the limits allow, in joint order.
+    pub fn rest(&self) -> Vec<f64> {
+        self.limits()
+            .iter()
+            .map(|l| 0.0_f64.clamp(l.lower, l.upper))
+            .collect()
+    }
+
     /// Index of a link by name.
     pub fn link(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|l| l == name)
@@ -248,6 +354,21 @@ impl RobotModel {
     pub fn actuated_index(&self, joint: usize) -> Option<usize> {
         self.actuated.iter().position(|j| *j == joint)
     }
+}
+
+/// Whether elements of xacro are in the text, comments aside.
+fn has_macros(text: &str) -> bool {
+    let mut rest = text;
+    while let Some(at) = rest.find("<xacro:") {
+        match rest.find("<!--") {
+            Some(comment) if comment < at => match rest[comment..].find("-->") {
+                Some(end) => rest = &rest[comment + end..],
+                None => return false,
+            },
+            _ => return true,
+        }
+    }
+    false
 }
 
 fn convert_joint(
@@ -264,11 +385,6 @@ fn convert_joint(
     let rpy = joint.origin.rpy.0;
     if xyz.iter().chain(&rpy).any(|v| !v.is_finite()) {
         return Err(bad("its origin holds a number that is not finite".into()));
-    }
-    if joint.mimic.is_some() {
-        return Err(bad(
-            "mimic joints are not supported; make it fixed or give it a servo of its own".into(),
-        ));
     }
     use urdf_rs::JointType;
     let kind = match joint.joint_type {
@@ -334,6 +450,35 @@ fn convert_joint(
         ),
         axis,
         limits,
+        mimic: None,
+    })
+}
+
+fn convert_mimic(
+    joint: &urdf_rs::Joint,
+    mimic: &urdf_rs::Mimic,
+    of: Option<usize>,
+    all: &[urdf_rs::Joint],
+) -> Result<Mimic, ModelError> {
+    let bad = |problem: String| ModelError::Joint {
+        joint: joint.name.clone(),
+        problem,
+    };
+    let of = of.ok_or_else(|| bad(format!("mimics {}, which is not a joint", mimic.joint)))?;
+    if all[of].mimic.is_some() || all[of].joint_type == urdf_rs::JointType::Fixed {
+        return Err(bad(format!(
+            "mimics {}, which is fixed or mimics another; name the joint that has the drive",
+            mimic.joint
+        )));
+    }
+    let (multiplier, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+    if !(multiplier.is_finite() && offset.is_finite()) {
+        return Err(bad("its mimic numbers are not finite".into()));
+    }
+    Ok(Mimic {
+        joint: of,
+        multiplier,
+        offset,
     })
 }
 
@@ -381,6 +526,33 @@ mod tests {
             error_of(&stranger)
         );
         assert!(error_of("not xml").contains("URDF"));
+        let macros = r#"<robot name="r"><xacro:leg name="a"/></robot>"#;
+        assert!(error_of(macros).contains("expand it first"));
+        assert!(!has_macros("<robot><!-- <xacro:leg/> --></robot>"));
+    }
+
+    #[test]
+    fn a_joint_that_mimics_moves_with_its_driver_and_needs_no_drive() {
+        let text = |mimic: &str| {
+            format!(
+                r#"<robot name="r"><link name="base"/><link name="a"/><link name="b"/>
+                <joint name="j" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+                <joint name="k" type="revolute"><origin xyz="1 0 0"/><parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>{mimic}</joint></robot>"#
+            )
+        };
+        let model =
+            RobotModel::from_urdf(&text(r#"<mimic joint="j" multiplier="-2" offset="0.1"/>"#))
+                .expect("a mimic joint");
+        assert_eq!(model.joint_names(), ["j"]);
+        let turned = model.link_pose(2, &[0.3]).rotation.angle();
+        assert!(
+            (turned - 0.2).abs() < 1e-12,
+            "0.3 - 0.6 + 0.1, found {turned}"
+        );
+        let message = error_of(&text(r#"<mimic joint="k"/>"#));
+        assert!(message.contains("mimics k"), "{message}");
+        let message = error_of(&text(r#"<mimic joint="q"/>"#));
+        assert!(message.contains("mimics q"), "{message}");
     }
 
     #[test]

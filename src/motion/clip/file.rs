@@ -137,42 +137,40 @@ impl ClipFile {
         Ok(file)
     }
 
-    /// JSON text, one line per frame, numbers rounded to a micro-radian and a micrometre.
+    /// JSON text, one line per frame, numbers rounded to a micro-radian.
     pub fn to_json(&self) -> String {
         let round = |v: f64| (v * 1e6).round() / 1e6 + 0.0;
-        let mut head = self.clone();
-        let rows = |rows: Vec<&[f64]>| {
-            let lines = rows.into_iter().map(|row| {
-                let numbers: Vec<f64> = row.iter().map(|v| round(*v)).collect();
-                let line = serde_json::to_string(&numbers).unwrap_or_default();
-                format!("    {line}")
-            });
-            lines.collect::<Vec<_>>().join(",\n")
+        let rows = |rows: &mut dyn Iterator<Item = &[f64]>| {
+            let rows: Vec<String> = rows
+                .map(|row| {
+                    let numbers: Vec<f64> = row.iter().map(|v| round(*v)).collect();
+                    format!(
+                        "    {}",
+                        serde_json::to_string(&numbers).unwrap_or_default()
+                    )
+                })
+                .collect();
+            format!("[\n{}\n  ]", rows.join(",\n"))
         };
-        // The head keeps one row of each table, which says where the table goes.
-        let tables = [
-            ("body", rows(self.body.iter().map(|r| &r[..]).collect())),
-            ("way", rows(self.way.iter().map(|r| &r[..]).collect())),
-            ("frames", rows(self.frames.iter().map(|r| &r[..]).collect())),
-        ];
-        head.body.truncate(1);
-        head.body.iter_mut().for_each(|r| *r = [0.0; 6]);
-        head.way.truncate(1);
-        head.way.iter_mut().for_each(|r| *r = [0.0; 3]);
-        head.frames = vec![Vec::new()];
-        let mut value = serde_json::to_string_pretty(&head).unwrap_or_default();
-        for (key, rows) in tables {
-            // Keys of the top level are indented by two; only they can be meant.
-            let Some(start) = value.find(&format!("\n  \"{key}\": [")) else {
-                continue;
-            };
-            let end = value[start..].find("\n  ]").map(|e| start + e);
-            if let Some(end) = end {
-                value.replace_range(start..end + 4, &format!("\n  \"{key}\": [\n{rows}\n  ]"));
-            }
+        let mut head = self.clone();
+        head.frames.clear();
+        head.body.clear();
+        head.way.clear();
+        let mut text = serde_json::to_string_pretty(&head).unwrap_or_default();
+        let mut tables = String::new();
+        if !self.body.is_empty() {
+            let body = rows(&mut self.body.iter().map(<[f64; 6]>::as_slice));
+            tables += &format!("\"body\": {body},\n  ");
         }
-        value.push('\n');
-        value
+        if !self.way.is_empty() {
+            let way = rows(&mut self.way.iter().map(<[f64; 3]>::as_slice));
+            tables += &format!("\"way\": {way},\n  ");
+        }
+        let frames = rows(&mut self.frames.iter().map(Vec::as_slice));
+        tables += &format!("\"frames\": {frames}");
+        text = text.replace("\"frames\": []", &tables);
+        text.push('\n');
+        text
     }
 
     fn check(&self) -> Result<(), ClipError> {

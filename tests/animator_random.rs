@@ -1,0 +1,238 @@
+//! Ten minutes of random gestures on the shipped walkers: limits kept, nothing jumps, feet stay where they stand.
+
+mod support;
+
+use handwave::base::random::SplitMix;
+use handwave::body::{Feet, RobotFeet, RootPose};
+use handwave::config::Character;
+use handwave::gesture::FrontEnd;
+use handwave::motion::Animator;
+use handwave::motion::class::Drive;
+use handwave::motion::layer::LayerInput;
+use nalgebra::Point3;
+use support::character::{RATE_HZ, performance, shipped};
+use support::counting::{Counting, allocations};
+use support::limits::LimitWatch;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const DT_S: f64 = 1.0 / RATE_HZ;
+
+/// One random gesture: comes and goes, changes its size and tempo at once, its phase jumps now and then.
+#[derive(Default)]
+struct Whim {
+    amplitude: f64,
+    wanted: f64,
+    frequency_hz: f64,
+    phase_rad: f64,
+    left_s: f64,
+    cyclic: bool,
+}
+
+impl Whim {
+    fn step(&mut self, random: &mut SplitMix) -> Drive {
+        self.left_s -= DT_S;
+        if self.left_s < 0.0 {
+            self.left_s = 0.4 + 5.0 * random.unit();
+            let performs = random.unit() < 0.6;
+            self.wanted = if performs {
+                0.15 + 1.0 * random.unit()
+            } else {
+                0.0
+            };
+            self.frequency_hz = 0.4 + 2.2 * random.unit();
+            if random.unit() < 0.2 {
+                self.phase_rad += 6.0 * random.unit() - 3.0;
+            }
+        }
+        // An estimator follows within a tenth of a second.
+        self.amplitude += (self.wanted - self.amplitude) * (DT_S / 0.1);
+        self.phase_rad = (self.phase_rad + self.frequency_hz * DT_S * std::f64::consts::TAU)
+            .rem_euclid(std::f64::consts::TAU);
+        let noise = 0.01 * random.normal();
+        Drive {
+            amplitude: (self.amplitude + noise).max(0.0),
+            frequency_hz: if self.cyclic { self.frequency_hz } else { 0.0 },
+            phase_rad: self.phase_rad + noise,
+            ..Drive::default()
+        }
+    }
+}
+
+/// A stance of one foot: where it began, and how far from there it has been.
+#[derive(Copy, Clone, Default)]
+struct Stance {
+    began: Option<Point3<f64>>,
+    slid_m: f64,
+}
+
+/// Watches feet: how far each slides while the animator has it on the ground.
+struct SlideWatch<'a> {
+    feet: &'a RobotFeet,
+    stances: Vec<Stance>,
+    slides_m: Vec<f64>,
+}
+
+impl<'a> SlideWatch<'a> {
+    fn new(feet: &'a RobotFeet) -> Self {
+        Self {
+            stances: vec![Stance::default(); feet.count()],
+            slides_m: Vec::with_capacity(100_000),
+            feet,
+        }
+    }
+
+    /// `pose`: joints as sent, with the animator's body over the ground.
+    fn see(&mut self, on_ground: impl Fn(usize) -> bool, root: &RootPose, pose: &[f64]) {
+        for (foot, stance) in self.stances.iter_mut().enumerate() {
+            let at = root.to_world(self.feet.position(pose, foot));
+            match (on_ground(foot), stance.began) {
+                (true, None) => {
+                    *stance = Stance {
+                        began: Some(at),
+                        slid_m: 0.0,
+                    }
+                }
+                (true, Some(began)) => {
+                    stance.slid_m = stance.slid_m.max((at.xy() - began.xy()).norm());
+                }
+                (false, Some(_)) => {
+                    self.slides_m.push(stance.slid_m);
+                    *stance = Stance::default();
+                }
+                (false, None) => {}
+            }
+        }
+    }
+
+    fn worst_mm(&self) -> f64 {
+        1e3 * self.slides_m.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+fn animator(character: &Character) -> (Animator, usize) {
+    let (header, _) = performance(character);
+    let front = FrontEnd::with_features(
+        &character.gestures,
+        &header,
+        character.front_options,
+        &character.neighbourhoods(),
+        &character.features(),
+    )
+    .expect("a front end");
+    let front = character.with_channels(front).expect("channels");
+    let channels = front.channel_names().len();
+    (character.animator(&front).expect("an animator"), channels)
+}
+
+fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
+    let Some(feet) = &character.body.feet else {
+        return;
+    };
+    let (mut animator, channels) = animator(character);
+    let joints = character.joints.len();
+    let mut envelope = character.envelope(DT_S);
+    let mut pose = vec![0.0; animator.coordinates()];
+    animator.rest_pose(&mut pose);
+    envelope.start(&pose[..joints]);
+    let mut random = SplitMix::new(seed);
+    let mut whims: Vec<Whim> = (character.gestures.gestures.iter())
+        .map(|g| Whim {
+            cyclic: g.kind == handwave::gesture::GestureKind::Cyclic,
+            ..Whim::default()
+        })
+        .collect();
+    let mut values = vec![0.0; channels];
+    let mut goals = values.clone();
+    let mut waves = vec![Drive::default(); whims.len()];
+    let mut drives = vec![Drive::default(); character.classes.len()];
+    let mut sent = pose[..joints].to_vec();
+    let mut limits = LimitWatch::new(&character.limits, DT_S);
+    let mut slides = SlideWatch::new(feet);
+    let mut root = animator.root();
+    let (mut held_back, mut allocated) = (0_u32, 0);
+    let (mut jump_m, mut jump_rad): (f64, f64) = (0.0, 0.0);
+    let cycles = (minutes * 60.0 * RATE_HZ) as usize;
+    for cycle in 0..cycles {
+        for (wave, whim) in waves.iter_mut().zip(&mut whims) {
+            *wave = whim.step(&mut random);
+        }
+        if cycle % 400 == 0 {
+            goals
+                .iter_mut()
+                .for_each(|g| *g = 1.4 * random.unit() - 0.7);
+        }
+        for (value, goal) in values.iter_mut().zip(&goals) {
+            *value += (goal - *value) * (DT_S / 0.2);
+        }
+        for (drive, class) in drives.iter_mut().zip(&character.classes) {
+            let wave = class.gesture.map_or(Drive::default(), |g| waves[g]);
+            *drive = Drive {
+                extra: [values[0], values[values.len() - 1]],
+                ..wave
+            };
+        }
+        let before = allocations();
+        let input = LayerInput {
+            channels: &values,
+            gestures: &waves,
+        };
+        animator.step(&drives, &input, DT_S, &mut pose);
+        held_back += u32::from(envelope.pass(&pose[..joints], &mut sent) > 0);
+        if cycle > 10 {
+            allocated += allocations() - before;
+        }
+        assert!(
+            pose.iter().chain(&sent).all(|v| v.is_finite()),
+            "{name}: not a number in cycle {cycle}, seed {seed}"
+        );
+        limits
+            .see(&sent)
+            .unwrap_or_else(|e| panic!("{name}, seed {seed}: {e}"));
+        let now = animator.root();
+        jump_m = jump_m.max((now.x_m - root.x_m).hypot(now.y_m - root.y_m));
+        jump_rad = jump_rad.max((now.yaw_rad - root.yaw_rad).abs());
+        root = now;
+        let mut shown = pose.clone();
+        shown[..joints].copy_from_slice(&sent);
+        let pins = animator.pins().expect("pinned feet");
+        slides.see(|foot| pins.on_ground(foot), &root, &shown);
+    }
+    let counts = animator.counts();
+    let mut sorted = slides.slides_m.clone();
+    sorted.sort_by(f64::total_cmp);
+    println!(
+        "{name}, seed {seed}: {cycles} cycles, {counts:?}, {} stances, slide median {:.3} mm, worst {:.3} mm; \
+         envelope acted in {held_back} cycles; root moves at most {:.2} mm and {:.4} rad a cycle; {}",
+        sorted.len(),
+        1e3 * sorted[sorted.len() / 2],
+        slides.worst_mm(),
+        1e3 * jump_m,
+        jump_rad,
+        limits.extremes(),
+    );
+    assert_eq!(allocated, 0, "{name}: allocations in the step");
+    assert!(
+        slides.worst_mm() < 2.0,
+        "{name}: a foot slid {:.2} mm in one stance",
+        slides.worst_mm()
+    );
+    assert!(counts.completed > 20, "{name}: only {counts:?}");
+    assert!(
+        jump_m < 0.01 && jump_rad < 0.05,
+        "{name}: root jumps {jump_m} m, {jump_rad} rad"
+    );
+    // Random gestures are no normal playing; still the envelope is a guard and not a filter.
+    assert!(
+        held_back < cycles as u32 / 200,
+        "{name}: envelope acted in {held_back} cycles"
+    );
+}
+
+#[test]
+fn ten_minutes_of_random_gestures_keep_limits_and_feet() {
+    for (name, character) in shipped() {
+        perform(&name, &character, 10.0, 7);
+    }
+}
