@@ -117,6 +117,16 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         }
     }
     .map_err(Failure::input)?;
+    if let (Some(avatar), true) = (
+        &character.body.avatar,
+        options.bus.is_some() || !options.fault.is_empty(),
+    ) {
+        return Err(Failure::input(format!(
+            "--bus and --fault are for servos; {} is an avatar of {} joints and has none: leave them out",
+            character.name,
+            avatar.skeleton.len()
+        )));
+    }
     if let Some(bus) = &options.bus {
         character.bus = bus
             .parse()
@@ -170,7 +180,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         .targets
         .as_ref()
         .map(|path| {
-            TargetsFile::create(path, &character.joints)
+            TargetsFile::create(path, &character)
                 .map_err(|e| Failure::input(format!("--targets {}: {e}", path.display())))
         })
         .transpose()?;

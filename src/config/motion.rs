@@ -9,7 +9,7 @@ use super::map::{MapParts, load_map};
 use crate::base::suggest::hint;
 use crate::gesture::{GestureKind, GestureSet};
 use crate::motion::class::{ClassOptions, EXTRA, Example, Play};
-use crate::motion::clip::{Clip, ClipFile, ClipKind};
+use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::graph::GraphOptions;
 use crate::motion::layer::ChannelMap;
 use crate::motion::weights::{Parameters, WeightKind};
@@ -66,18 +66,11 @@ pub(super) fn clip(
     path: &toml::Spanned<String>,
     key: &str,
     body: &Body,
+    kind: Option<ClipKind>,
     at: &Pointer<'_>,
 ) -> Result<Clip, ConfigError> {
-    let text = read(files, path, key, at)?;
-    ClipFile::from_json(&text)
-        .and_then(|f| body.clip(&f))
-        .map_err(|e| {
-            at.at(
-                path.span(),
-                key,
-                format!("{}: {e}", files.name(path.get_ref())),
-            )
-        })
+    body.named_clip(files, path.get_ref(), kind)
+        .map_err(|problem| at.at(path.span(), key, problem))
 }
 
 /// Classes in node order, with their clips.
@@ -106,6 +99,10 @@ pub(super) fn class_parts(
         let gesture = (class.gesture.as_ref())
             .map(|entry| gesture_named(entry, "class.gesture", gestures, at))
             .transpose()?;
+        if let (Some(path), Some(_)) = (&class.map, &body.avatar) {
+            let problem = "a pose map drives a robot; a class of an avatar has clips";
+            return Err(at.at(path.span(), "class.map", problem));
+        }
         if let Some(path) = &class.map {
             parts.push(direct_parts(
                 files, file, class, path, joints, limits, gesture, at,
@@ -129,6 +126,15 @@ pub(super) fn class_parts(
             ));
         }
         let (extra, names) = extra_parts(class, at)?;
+        let kind = match (gesture, play) {
+            (_, Play::Loop) => Some(ClipKind::Cycle),
+            (_, Play::Once) => Some(ClipKind::Path),
+            (Some(gesture), Play::Gesture) => Some(match gestures.gestures[gesture].kind {
+                GestureKind::Cyclic => ClipKind::Cycle,
+                GestureKind::NonCyclic => ClipKind::Path,
+            }),
+            (None, Play::Gesture) => None,
+        };
         let mut examples = Vec::new();
         for entry in &class.clip {
             let in_range = (0.0..=10.0).contains(&entry.amplitude)
@@ -143,7 +149,7 @@ pub(super) fn class_parts(
                     ),
                 ));
             }
-            let clip = clip(files, &entry.file, "class.clip.file", body, at)?;
+            let clip = clip(files, &entry.file, "class.clip.file", body, kind, at)?;
             if clip.kind == ClipKind::Cycle && entry.amplitude > 0.0 && entry.frequency_hz <= 0.0 {
                 return Err(at.at(
                     entry.file.span(),
