@@ -24,6 +24,9 @@ struct Limb {
 /// Rounds at most, and the distance that counts as there, metres.
 const ROUNDS: usize = 50;
 const TOLERANCE_M: f64 = 1e-7;
+/// Damping as a part of the squared reach. It stays: near a stretched limb an exact way there would swing the joints,
+/// a damped one stops a little short.
+const DAMPING: f64 = 3e-3;
 
 impl SkeletonFeet {
     /// No limb yet.
@@ -79,7 +82,7 @@ impl Feet for SkeletonFeet {
     /// little; hinges are not known to a skeleton.
     fn place(&self, pose: &mut [f64], foot: usize, goal: Point3<f64>) -> f64 {
         let limb = &self.limbs[foot];
-        let mut damping = 1e-6 * limb.reach_m * limb.reach_m;
+        let mut damping = DAMPING * limb.reach_m * limb.reach_m;
         let mut left = (goal - self.position(pose, foot)).norm();
         for _ in 0..ROUNDS {
             if left < TOLERANCE_M {
@@ -99,7 +102,6 @@ impl Feet for SkeletonFeet {
             let now = (goal - self.position(pose, foot)).norm();
             if now < left {
                 left = now;
-                damping *= 0.3;
             } else {
                 // Too far: back, and shorter.
                 self.turn(limb, pose, end, y, -1.0);

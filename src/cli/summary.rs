@@ -150,6 +150,9 @@ fn torque_lines(report: &Report, character: &Character) -> String {
 /// One line per servo and kind of fault, with the first few times; faults that struck all servos at
 /// once are those of the line, not of a servo, and get one line together.
 fn fault_lines(report: &Report, character: &Character) -> String {
+    if character.servos.is_empty() {
+        return String::new();
+    }
     let stats = &report.stats;
     let at_once = |fault: &ServoFault| {
         let same = |f: &&ServoFault| f.kind == fault.kind && f.from_s == fault.from_s;

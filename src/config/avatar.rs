@@ -28,7 +28,7 @@ pub struct Avatar {
 }
 
 /// Frames of a clip per second of an imported motion, and least and most of them.
-const FRAMES_PER_S: f64 = 60.0;
+const FRAMES_PER_S: f64 = 30.0;
 const FRAMES: (f64, f64) = (24.0, 600.0);
 /// A foot is low in this part of its way up and down.
 const LOW: f64 = 0.35;

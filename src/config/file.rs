@@ -256,8 +256,8 @@ pub struct AvatarEntry {
     /// Limbs that stand on the ground.
     #[serde(default)]
     pub limb: Vec<LimbEntry>,
-    /// Feet that stand on the ground stay where they are.
-    #[serde(default = "yes")]
+    /// Feet that stand on the ground stay where they are, by turning the limb's joints; quick motion jerks.
+    #[serde(default)]
     pub pin_feet: bool,
 }
 
