@@ -3,7 +3,8 @@
 //! Time moves forward (a character that plays) or jumps (a search that looks anywhere). Clips have 32 frames,
 //! poses are f64. Reference: ozz-animation 0.16 (C++, SIMD, f32, keyframes compressed), built with -O3 and run on a
 //! machine like this one: 60 joints, 4 clips to model space 3.2 to 5.1 us; 6 clips and 3 additive layers 7 to
-//! 11 us; 850 to 1260 such characters at 60 Hz on one core. Run alone, or compare medians of several runs.
+//! 11 us; 850 to 1260 such characters at 60 Hz on one core. Run alone, or compare medians of several runs: beside
+//! other work on the same cores the figures here doubled.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -185,6 +186,9 @@ fn figure(name: &str, joints: usize, mut step: impl FnMut()) {
     );
 }
 
+/// Name, joints, and one step of it.
+type Scene = (String, usize, Box<dyn FnMut()>);
+
 fn animate(c: &mut Criterion) {
     let urdf = include_str!("../configs/robots/pup.urdf");
     let model = RobotModel::from_urdf(urdf).expect("shipped URDF");
@@ -192,7 +196,7 @@ fn animate(c: &mut Criterion) {
     let mut links = vec![Isometry3::identity(); model.links.len()];
     let skeleton = skeleton();
     let mut frames = vec![Isometry3::identity(); JOINTS];
-    let mut scenes: Vec<(String, usize, Box<dyn FnMut()>)> = Vec::new();
+    let mut scenes: Vec<Scene> = Vec::new();
     for (way, time) in times() {
         let mut add = |name: &str, joints: usize, step: Box<dyn FnMut()>| {
             scenes.push((format!("{name}, {way}"), joints, step));

@@ -51,8 +51,8 @@ fn what_cannot_be_an_avatar_is_refused_with_file_and_key() {
         "fox.glb\"",
         &["3 animations", "fox.glb#NAME"],
     );
-    check("@0..1.0", "@0..9.0", &["3.4", "length of Survey"]);
-    check("@0..1.0", "@soon", &["@0.5..1.2"]);
+    check("@0..1.2", "@0..9.0", &["3.4", "length of Survey"]);
+    check("@0..1.2", "@soon", &["@0.5..1.2"]);
     check(
         "\"b_LeftHand_011\"",
         "\"b_LeftHand_01\"",

@@ -50,6 +50,7 @@ pub const EXAMPLES: &str = "Examples:
   my_tracker | handwave run my_robot.toml --input -   live from a pipe (JSON Lines or CSV)
   handwave run --scale 1.5                            a small hand (its poses enlarged to the gestures' size)
   handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
+  handwave run configs/fox.toml --headless --speed max --targets fox.csv   an avatar: rotations, no servos
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
 Ctrl-C once: the robot comes to rest, lies down, torque goes off. Twice: torque goes off at once.

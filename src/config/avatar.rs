@@ -295,8 +295,11 @@ fn path_of(files: &Files, name: &str) -> Result<PathBuf, String> {
     }
 }
 
+/// A part of a motion, seconds.
+type Part = (f64, f64);
+
 /// `FILE@FROM..TO` as file and seconds.
-fn split_part(name: &str) -> Result<(&str, Option<(f64, f64)>), String> {
+fn split_part(name: &str) -> Result<(&str, Option<Part>), String> {
     let Some((file, part)) = name.rsplit_once('@') else {
         return Ok((name, None));
     };

@@ -145,15 +145,11 @@ mod tests {
                 (sum - 1.0).abs() < 1e-12 && shares.iter().all(|s| *s >= 0.0),
                 "{shares:?}"
             );
-            for i in 0..4 {
+            for (i, weight) in weights.iter().enumerate() {
                 let rebuilt: f64 = (corners.iter().zip(&shares))
                     .map(|(c, s)| s * cells.references[*c][i])
                     .sum();
-                assert!(
-                    (rebuilt - weights[i]).abs() < 1e-12,
-                    "{rebuilt} for {}",
-                    weights[i]
-                );
+                assert!((rebuilt - weight).abs() < 1e-12, "{rebuilt} for {}", weight);
             }
         }
         let references = cells.references.clone();
