@@ -1,17 +1,14 @@
 //! From a configuration to checked parts: every file read, every name resolved, every number in range.
 
-use super::avatar::{Avatar, coordinate_names};
 use super::body::Body;
 use super::channel::{self, ChannelParts, channel_parts};
 use super::error::{ConfigError, Pointer};
-use super::file::{
-    AvatarEntry, CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault, RobotEntry,
-};
+use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
 use super::gestures::{GestureFiles, Reader, merged};
 use super::layer::{LayerParts, channel_index, layer_parts};
 use super::motion::{ClassParts, GraphParts, class_parts, clip, graph_parts, neighbourhoods, read};
-use super::servos::servo_map;
+use super::parts::{Parts, parts};
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{
@@ -464,107 +461,6 @@ fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<(), ConfigErr
 /// Where a clip leaves a robot's limits.
 fn outside(clip: &Clip, model: Option<&RobotModel>) -> Option<String> {
     outside_limits(clip, model?).into_iter().next()
-}
-
-/// What is driven, and what carries the targets to it.
-struct Parts {
-    model: Option<RobotModel>,
-    body: Body,
-    joints: Vec<String>,
-    limits: Vec<JointEnvelope>,
-    servos: Vec<ServoSpec>,
-    wire: WireParts,
-}
-
-struct WireParts {
-    bus: BusAddress,
-    baud: u32,
-    rate_hz: f64,
-    watchdog_ms: u32,
-}
-
-/// A robot on its bus, or an avatar.
-fn parts(files: &Files, file: &CharacterFile, at: &Pointer<'_>) -> Result<Parts, ConfigError> {
-    let (robot, bus) = match (&file.robot, &file.bus, &file.avatar) {
-        (Some(robot), Some(bus), None) => (robot, bus),
-        (None, None, Some(avatar)) => return avatar_parts(files, avatar, at),
-        (Some(_), _, Some(avatar)) => {
-            let problem =
-                "a character is a robot or an avatar: leave out [robot] and [bus], or [avatar]";
-            return Err(at.at(avatar.model.span(), "avatar", problem));
-        }
-        (None, Some(_), Some(_)) => {
-            let problem = "an avatar has no servos: leave [bus] out (rate_hz stands in [avatar])";
-            return Err(at.key("bus.bus", problem));
-        }
-        (Some(robot), None, None) => {
-            let problem = "a robot needs a bus; add [bus] with bus = \"sim\"";
-            return Err(at.at(robot.urdf.span(), "bus", problem));
-        }
-        (None, _, None) => {
-            let problem =
-                "nothing to move: add [robot] with urdf and [bus], or [avatar] with model";
-            return Err(at.key("robot", problem));
-        }
-    };
-    let model = RobotModel::from_urdf(&read(files, &robot.urdf, "robot.urdf", at)?)
-        .map_err(|e| at.at(robot.urdf.span(), "robot.urdf", e))?;
-    Ok(Parts {
-        body: Body::new(&model, robot, at)?,
-        joints: model.joint_names(),
-        limits: envelope_limits(robot, &model),
-        servos: servo_map(robot, bus, &model, at)?,
-        model: Some(model),
-        wire: WireParts {
-            bus: bus.bus.parse().map_err(|e| at.key("bus.bus", e))?,
-            baud: bus.baud,
-            rate_hz: bus.rate_hz,
-            watchdog_ms: bus.watchdog_ms,
-        },
-    })
-}
-
-/// Limits that hold nothing back: an avatar's joints have none, and its coordinates are no angles.
-const FREE: JointEnvelope = JointEnvelope {
-    lower: -1e9,
-    upper: 1e9,
-    velocity: 1e9,
-    acceleration: 1e12,
-};
-
-fn avatar_parts(
-    files: &Files,
-    entry: &AvatarEntry,
-    at: &Pointer<'_>,
-) -> Result<Parts, ConfigError> {
-    let body = Body::of_avatar(Avatar::load(files, entry, at)?);
-    let joints = coordinate_names(body.space.get());
-    Ok(Parts {
-        model: None,
-        limits: vec![FREE; joints.len()],
-        joints,
-        body,
-        servos: Vec::new(),
-        wire: WireParts {
-            bus: BusAddress::Sim,
-            baud: 0,
-            rate_hz: entry.rate_hz,
-            watchdog_ms: 0,
-        },
-    })
-}
-
-fn envelope_limits(robot: &RobotEntry, model: &RobotModel) -> Vec<JointEnvelope> {
-    model
-        .limits()
-        .iter()
-        .map(|l| JointEnvelope {
-            lower: l.lower,
-            upper: l.upper,
-            velocity: l.velocity * robot.velocity_share,
-            acceleration: robot.acceleration_rad_s2,
-        })
-        .collect()
 }
 
 /// All gesture files as one set, with their paths and texts.

@@ -14,6 +14,7 @@ mod gestures;
 mod layer;
 pub mod map;
 mod motion;
+mod parts;
 mod servos;
 pub mod starter;
 

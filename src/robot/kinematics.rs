@@ -1,7 +1,42 @@
 //! Forward kinematics: where a link is for given joint positions.
 
-use super::model::{JointKind, RobotModel};
+use super::model::{Joint, JointKind, RobotModel};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+/// A joint in the order of kinematics.
+#[derive(Copy, Clone, Debug)]
+pub(super) struct OrderedJoint {
+    /// Index of the joint.
+    joint: usize,
+    /// Its place among those that move; beyond them for a fixed one.
+    position: usize,
+}
+
+/// All joints, those nearer the root first. The joints form one tree.
+pub(super) fn outwards(
+    joints: &[Joint],
+    parent_joint: &[Option<usize>],
+    actuated: &[usize],
+) -> Vec<OrderedJoint> {
+    let depth = |joint: usize| {
+        let mut above = 0;
+        let mut at = joints[joint].parent;
+        while let Some(j) = parent_joint[at] {
+            above += 1;
+            at = joints[j].parent;
+        }
+        above
+    };
+    let position = |joint: usize| actuated.iter().position(|j| *j == joint);
+    let mut order: Vec<OrderedJoint> = (0..joints.len())
+        .map(|joint| OrderedJoint {
+            joint,
+            position: position(joint).unwrap_or(usize::MAX),
+        })
+        .collect();
+    order.sort_by_key(|o| (depth(o.joint), o.joint));
+    order
+}
 
 impl RobotModel {
     /// Pose of `link` in the root link's frame.

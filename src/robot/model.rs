@@ -80,16 +80,7 @@ pub struct RobotModel {
     /// What is odd but not wrong, for the reader.
     pub warnings: Vec<String>,
     /// Joints from the root outwards.
-    pub(super) order: Vec<OrderedJoint>,
-}
-
-/// A joint in the order of kinematics.
-#[derive(Copy, Clone, Debug)]
-pub(super) struct OrderedJoint {
-    /// Index of the joint.
-    pub(super) joint: usize,
-    /// Its place among those that move; beyond them for a fixed one.
-    pub(super) position: usize,
+    pub(super) order: Vec<super::kinematics::OrderedJoint>,
 }
 
 /// Why a URDF cannot be used.
@@ -220,25 +211,7 @@ impl RobotModel {
         if names.len() != joints.len() {
             return Err(ModelError::NotATree("two joints have the same name".into()));
         }
-        let mut order: Vec<OrderedJoint> = (0..joints.len())
-            .map(|joint| OrderedJoint {
-                joint,
-                position: actuated
-                    .iter()
-                    .position(|j| *j == joint)
-                    .unwrap_or(usize::MAX),
-            })
-            .collect();
-        let depth = |joint: usize| {
-            let mut above = 0;
-            let mut at = joints[joint].parent;
-            while let Some(j) = parent_joint[at] {
-                above += 1;
-                at = joints[j].parent;
-            }
-            above
-        };
-        order.sort_by_key(|o| (depth(o.joint), o.joint));
+        let order = super::kinematics::outwards(&joints, &parent_joint, &actuated);
         Ok(Self {
             order,
             name: urdf.name,
