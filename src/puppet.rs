@@ -14,6 +14,7 @@ use crate::motion::{Animator, ease};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
 use gaps::{GAP_S, Join, Tempo};
+use std::f64::consts::TAU;
 
 /// What happens when poses have been missing for longer than `lost_s`.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -95,6 +96,10 @@ pub struct Targets {
 pub struct ClassInput {
     /// Index of its gesture in the front end; `None` for a pose map that needs none.
     pub gesture: Option<usize>,
+    /// The gesture is to be performed in the opposite sense.
+    pub reverse: bool,
+    /// The channel that drives it in place of a gesture, by index in the front end.
+    pub channel: Option<(usize, ChannelMap)>,
     /// Index of its feature in the front end, for a pose map.
     pub feature: Option<usize>,
     /// Channels that drive its parameters beside amplitude and frequency, by index in the front end.
@@ -332,42 +337,8 @@ impl Puppet {
         for (gesture, estimate) in self.estimates.iter_mut().enumerate() {
             *estimate = self.front.predict(gesture, actuation - self.tempo.held_s);
         }
-        for (class, input) in self.class_inputs.iter().enumerate() {
-            if let Some(features) = input.feature.and_then(|index| self.front.feature(index)) {
-                let seen = Seen {
-                    feature: features.feature(),
-                    yaw_rad: features.yaw_rad(),
-                    share,
-                };
-                self.animator.see(class, seen);
-            }
-            let drive = &mut self.drives[class];
-            let Some(gesture) = input.gesture else {
-                // Played while nothing else is: it asks for nothing.
-                drive.amplitude = 0.0;
-                continue;
-            };
-            let estimate = &self.estimates[gesture];
-            let moving = self.animator.played()[class].amplitude > MOVING;
-            let (frequency_hz, phase_rad) = match estimate.kind {
-                GestureKind::Cyclic => self.joins[class].step(estimate, age > GAP_S, moving, dt_s),
-                GestureKind::NonCyclic => (0.0, estimate.phase_rad),
-            };
-            *drive = Drive {
-                amplitude: estimate.amplitude * share,
-                frequency_hz,
-                phase_rad,
-                extra: [0.0; EXTRA],
-            };
-        }
         self.read_channels(share);
-        for (drive, input) in self.drives.iter_mut().zip(&self.class_inputs) {
-            for (value, source) in drive.extra.iter_mut().zip(&input.extra) {
-                *value = source.map_or(0.0, |(channel, map)| {
-                    map.weight(self.channels.get(channel).copied().unwrap_or(f64::NAN))
-                });
-            }
-        }
+        self.drive_classes(share, age, dt_s);
         let input = LayerInput {
             channels: &self.channels,
             gestures: &self.waves,
@@ -386,6 +357,45 @@ impl Puppet {
             0.0
         };
         self.last_pose.copy_from_slice(&self.pose);
+    }
+
+    /// What every class is driven by in this step.
+    fn drive_classes(&mut self, share: f64, age: f64, dt_s: f64) {
+        let channels = &self.channels;
+        let weigh = |(channel, map): (usize, ChannelMap)| {
+            map.weight(channels.get(channel).copied().unwrap_or(f64::NAN))
+        };
+        for (class, input) in self.class_inputs.iter().enumerate() {
+            if let Some(features) = input.feature.and_then(|index| self.front.feature(index)) {
+                let seen = Seen {
+                    feature: features.feature(),
+                    yaw_rad: features.yaw_rad(),
+                    share,
+                };
+                self.animator.see(class, seen);
+            }
+            let drive = &mut self.drives[class];
+            *drive = Drive::default();
+            for (value, source) in drive.extra.iter_mut().zip(&input.extra) {
+                *value = source.map_or(0.0, weigh);
+            }
+            let Some(gesture) = input.gesture else {
+                // Without a channel it is played while nothing else is: it asks for nothing.
+                drive.amplitude = input.channel.map_or(0.0, weigh);
+                continue;
+            };
+            let mut estimate = self.estimates[gesture].clone();
+            if input.reverse {
+                estimate.frequency_hz = -estimate.frequency_hz;
+                estimate.phase_rad = TAU - estimate.phase_rad;
+            }
+            let moving = self.animator.played()[class].amplitude > MOVING;
+            (drive.frequency_hz, drive.phase_rad) = match estimate.kind {
+                GestureKind::Cyclic => self.joins[class].step(&estimate, age > GAP_S, moving, dt_s),
+                GestureKind::NonCyclic => (0.0, estimate.phase_rad),
+            };
+            drive.amplitude = estimate.amplitude * share;
+        }
     }
 
     /// Channels, and gestures as layers see them; with `share` 0 all are released.
@@ -465,6 +475,12 @@ impl Puppet {
     /// What the last step gave.
     pub fn targets(&self) -> &Targets {
         &self.targets
+    }
+
+    /// The animator's pose in the last step: joints before the envelope, then the body over the ground where
+    /// it walks.
+    pub fn pose(&self) -> &[f64] {
+        &self.pose
     }
 
     /// Gestures as used in the last step, in file order.

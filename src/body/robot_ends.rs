@@ -3,7 +3,7 @@
 use super::Feet;
 use crate::robot::RobotModel;
 use crate::robot::ik::{ChainIk, Goal, IkError};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// Ends of a robot's chains as [`Feet`], so that blending can keep them where they belong. Poses start
 /// with the joint positions in model order; places are in the root link's frame.
@@ -45,6 +45,9 @@ impl Feet for RobotEnds {
     fn place(&self, pose: &mut [f64], foot: usize, goal: Point3<f64>) -> f64 {
         self.chains[foot].solve(&self.model, &Goal::at(goal), pose)
     }
+
+    /// It is bolted down: nothing moves.
+    fn shift(&self, _: &mut [f64], _: Vector3<f64>) {}
 
     fn reach_m(&self, foot: usize) -> f64 {
         // Along the links: no joint can make it longer but a prismatic one.

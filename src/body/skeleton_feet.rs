@@ -114,6 +114,12 @@ impl Feet for SkeletonFeet {
         left
     }
 
+    fn shift(&self, pose: &mut [f64], way: Vector3<f64>) {
+        for (coordinate, way) in pose[..3].iter_mut().zip(way.iter()) {
+            *coordinate += way;
+        }
+    }
+
     fn reach_m(&self, foot: usize) -> f64 {
         self.limbs[foot].reach_m
     }

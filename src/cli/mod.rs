@@ -5,6 +5,8 @@ pub mod character;
 pub mod clip;
 mod failure;
 pub mod gesture;
+pub mod graph;
+mod graph_build;
 mod legged;
 pub mod map;
 pub mod poses;
@@ -45,6 +47,8 @@ enum Command {
     Character(character::CharacterArgs),
     /// Pose mapping: the performer's pose itself drives a body; suggest, learn, apply, study
     Map(map::MapArgs),
+    /// The motion graph: build classes, show it, check it, compare ways to find transitions
+    Graph(graph::GraphArgs),
     /// Look at and set up servos on a bus
     Bus(bus::BusArgs),
     /// Simulated servos on a pseudo-terminal, for any client
@@ -62,6 +66,7 @@ pub fn main() -> ExitCode {
         Some(Command::Clip(args)) => clip::run(&args),
         Some(Command::Character(args)) => character::run(&args),
         Some(Command::Map(args)) => map::run(args),
+        Some(Command::Graph(args)) => graph::run(&args),
         Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),
     };

@@ -2,12 +2,13 @@
 
 use super::body::Body;
 use super::channel::{self, ChannelParts, channel_parts};
+use super::class::{ClassParts, class_parts};
 use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
 use super::files::Files;
 use super::gestures::{GestureFiles, Reader, merged};
-use super::layer::{LayerParts, channel_index, layer_parts};
-use super::motion::{ClassParts, GraphParts, class_parts, clip, graph_parts, neighbourhoods, read};
+use super::layer::{LayerParts, layer_parts};
+use super::motion::{GraphParts, clip, graph_parts, neighbourhoods, read};
 use super::parts::{Parts, parts};
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
@@ -15,15 +16,15 @@ use crate::gesture::{
     EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet, PerformerScale,
 };
 use crate::motion::Animator;
-use crate::motion::class::{EXTRA, MotionClass};
+use crate::motion::class::MotionClass;
 use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
-use crate::motion::layer::ChannelMap;
 use crate::motion::mapping::DirectClass;
 use crate::motion::node::Node;
 use crate::motion::range::JointRange;
 use crate::pose::PoseHeader;
+use crate::puppet::ClassInput;
 use crate::robot::{Envelope, JointEnvelope, RobotModel};
 
 /// A checked character: everything but the pose stream and the bus.
@@ -287,27 +288,23 @@ impl Character {
         })
     }
 
-    /// Per class the channels that drive its parameters beside amplitude and frequency.
-    pub fn extra_channels(
-        &self,
-        front: &FrontEnd,
-    ) -> Result<Vec<[Option<(usize, ChannelMap)>; EXTRA]>, ConfigError> {
+    /// Per class what drives it, bound to the channels of `front`; features are counted as in
+    /// [`Character::features`].
+    pub fn class_inputs(&self, front: &FrontEnd) -> Result<Vec<ClassInput>, ConfigError> {
+        let mut features = 0..;
         (self.classes.iter())
-            .map(|class| {
-                let mut bound = [None; EXTRA];
-                for (slot, parts) in bound.iter_mut().zip(&class.extra) {
-                    let channel =
-                        channel_index(front, &parts.channel).map_err(|e| ConfigError {
-                            file: self.config_name.clone(),
-                            line: Some(parts.line),
-                            key: "class.parameter.channel".into(),
-                            problem: format!("class {}: {e}", class.name),
-                        })?;
-                    *slot = Some((channel, parts.map));
-                }
-                Ok(bound)
-            })
+            .map(|class| class.input(front, &mut features, &self.config_name))
             .collect()
+    }
+
+    /// The robot, for what works on robots alone.
+    pub fn robot(&self) -> Result<&RobotModel, ConfigError> {
+        self.model.as_ref().ok_or_else(|| ConfigError {
+            file: self.config_name.clone(),
+            line: None,
+            key: "avatar".into(),
+            problem: "this needs a robot with joints and limits; the character is an avatar".into(),
+        })
     }
 
     /// Where an avatar stands before a run: as with nothing performed.
@@ -367,6 +364,17 @@ impl Character {
                 config_name: self.config_name.clone(),
             },
         )
+    }
+
+    /// Start node and edges (from, to) of the motion graph, as indices of [`Character::classes`].
+    pub fn graph(&self) -> (usize, &[(usize, usize)]) {
+        (self.graph.0, &self.graph.1)
+    }
+
+    /// The clip of the layer of this name.
+    pub fn layer_clip(&self, name: &str) -> Option<&Clip> {
+        let layer = self.layers.iter().find(|l| l.name == name)?;
+        Some(&layer.clip)
     }
 
     /// Names of the layers, in order.

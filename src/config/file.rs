@@ -82,6 +82,11 @@ pub struct ClassEntry {
     pub clip: Vec<ClipEntry>,
     /// Instead of clips, path of a pose map: the pose itself drives the body.
     pub map: Option<Spanned<String>>,
+    /// Instead of a gesture: the channel that drives it.
+    pub channel: Option<DrivingChannelEntry>,
+    /// The gesture is to be performed in the opposite sense.
+    #[serde(default)]
+    pub reverse: bool,
     /// What moves it along: `gesture` (phase or progression), `once` (the clock, whenever the gesture is
     /// performed anew) or `loop` (the clock, round and round).
     pub play: Option<Spanned<String>>,
@@ -95,6 +100,19 @@ pub struct ClassEntry {
     /// Parameters beside amplitude and frequency.
     #[serde(default)]
     pub parameter: Vec<ParameterEntry>,
+}
+
+/// A channel that drives a class in place of a gesture.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrivingChannelEntry {
+    /// Channel name.
+    pub name: Spanned<String>,
+    /// Channel values at 0 and at 1 of the class's amplitude or progression.
+    pub range: Spanned<[f64; 2]>,
+    /// Part of the range that counts as nothing.
+    #[serde(default)]
+    pub dead_zone: f64,
 }
 
 /// A parameter of a class that a channel drives.

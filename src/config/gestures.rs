@@ -1,8 +1,9 @@
 //! The gesture files of a character: read, merged, checked against its classes, and read again when changed.
 
 use super::channel::{self, ChannelParts};
+use super::class::ClassParts;
 use super::files::{FileStamp, Files};
-use super::motion::{ClassParts, neighbourhoods};
+use super::motion::neighbourhoods;
 use crate::gesture::{FrontEnd, FrontEndOptions, GestureKind, GestureSet, PerformerScale};
 use crate::pose::PoseHeader;
 

@@ -1,10 +1,11 @@
 //! Layers of a configuration, checked, and bound to the channels of a stream.
 
 use super::body::Body;
+use super::class::gesture_named;
 use super::error::{ConfigError, Pointer};
 use super::file::LayerEntry;
 use super::files::Files;
-use super::motion::{clip, gesture_named};
+use super::motion::clip;
 use crate::base::suggest::hint;
 use crate::gesture::{FrontEnd, GestureSet};
 use crate::motion::clip::{Clip, ClipKind};
@@ -16,7 +17,7 @@ use crate::motion::range::JointRange;
 pub(super) struct LayerParts {
     pub(super) name: String,
     source: Source,
-    clip: Clip,
+    pub(super) clip: Clip,
     joints: Option<Vec<String>>,
     frequency_hz: Option<f64>,
     idle_only: bool,

@@ -7,6 +7,7 @@ mod avatar;
 pub mod body;
 pub mod build;
 mod channel;
+mod class;
 pub mod error;
 pub mod file;
 pub mod files;

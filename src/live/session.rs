@@ -15,7 +15,7 @@ use crate::config::{Character, ConfigError, GestureFiles};
 use crate::gesture::{FrontEnd, FrontEndError, TrackingCounts};
 use crate::motion::graph::TransitionCounts;
 use crate::pose::{FaultCounts, PoseError, PoseHeader, PoseReader, PoseSample};
-use crate::puppet::{ClassInput, LostPolicy, Puppet, PuppetOptions};
+use crate::puppet::{LostPolicy, Puppet, PuppetOptions};
 use std::io::BufRead;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -81,7 +81,7 @@ pub fn puppet(
     )?;
     let front = character.with_channels(front)?;
     let mut animator = character.animator(&front)?;
-    let inputs = class_inputs(character, &front)?;
+    let inputs = character.class_inputs(&front)?;
     let end_pose = character.end_pose.clone().unwrap_or_else(|| {
         let mut rest = vec![0.0; animator.coordinates()];
         animator.rest_pose(&mut rest);
@@ -110,19 +110,6 @@ pub fn puppet(
             },
         },
     ))
-}
-
-/// What drives each class; features are counted as in [`Character::features`].
-fn class_inputs(character: &Character, front: &FrontEnd) -> Result<Vec<ClassInput>, ConfigError> {
-    let mut features = 0..;
-    let extra = character.extra_channels(front)?;
-    Ok((character.classes.iter().zip(extra))
-        .map(|(class, extra)| ClassInput {
-            gesture: class.gesture,
-            feature: class.map.as_ref().and_then(|_| features.next()),
-            extra,
-        })
-        .collect())
 }
 
 /// Options of the control loop for `character`.

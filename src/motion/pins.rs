@@ -16,25 +16,71 @@ const LOW: f64 = 0.04;
 const SLOW_PER_S: f64 = 0.4;
 /// How fast what a pin left of an offset is taken back in flight, 1/s.
 const RETURN_RATE: f64 = 14.0;
-/// How fast a foot comes to rest at touch-down, and to ground height, 1/s.
+/// How fast a foot comes to rest at touch-down, 1/s: what it still moves is a 60th of its speed.
 const LANDING_RATE: f64 = 60.0;
-/// In flight a foot may be slower or faster than the unconstrained one by this part of its speed.
+/// How fast it comes to ground height, 1/s.
+const SETTLING_RATE: f64 = 40.0;
+/// In flight an offset is taken back at most with this part of the foot's own speed, so that the shown
+/// foot keeps between half and one and a half of it.
 const FLIGHT_SPEED: f64 = 0.5;
+/// And at least this fast, m/s: a foot that hovers must come back too.
+const LEAST_RETURN_M_S: f64 = 0.05;
 /// A leg that is this much too short moves its pin, metres.
 const OUT_OF_REACH_M: f64 = 1e-4;
 
-/// One foot's state.
+/// How often the body may give way to legs that do not reach, in one step.
+const BODY_ROUNDS: usize = 4;
+
+/// One foot's state, in the world.
 #[derive(Clone, Debug, Default)]
 struct Pin {
     on_ground: bool,
-    /// Where the foot is, in the world.
+    /// Where the foot is.
     at: Point3<f64>,
-    /// How it still moves while landing, m/s.
+    /// How it moves, m/s.
     velocity: Vector3<f64>,
-    /// From the unconstrained foot to the shown one, per axis, in the world.
+    /// Height over the ground while it stands.
+    height: Follower,
+    /// In flight: from the unconstrained foot to the shown one.
     offset: [Follower; 3],
-    /// Where the unconstrained foot was, in the world.
+    /// Where the unconstrained foot was.
     free: Point3<f64>,
+}
+
+impl Pin {
+    /// Lands or stands: what moved the foot in flight ebbs away, then it stays.
+    fn stand(&mut self, ground_m: f64, dt_s: f64) {
+        if !self.on_ground {
+            self.height = Follower::moving(self.at.z, self.velocity.z);
+        }
+        self.velocity *= (-LANDING_RATE * dt_s).exp();
+        self.at.x += self.velocity.x * dt_s;
+        self.at.y += self.velocity.y * dt_s;
+        self.at.z = self.height.step(ground_m, SETTLING_RATE, 1e3, dt_s);
+        self.velocity.z = self.height.speed();
+    }
+
+    /// Lifts off or flies: goes over into the unconstrained motion without a step in place or speed.
+    fn fly(&mut self, free: Point3<f64>, free_velocity: Vector3<f64>, dt_s: f64) {
+        if self.on_ground {
+            for (axis, offset) in self.offset.iter_mut().enumerate() {
+                *offset = Follower::moving(
+                    self.at[axis] - self.free[axis],
+                    self.velocity[axis] - free_velocity[axis],
+                );
+            }
+        }
+        let bound = (FLIGHT_SPEED * free_velocity.norm()).max(LEAST_RETURN_M_S);
+        for (axis, offset) in self.offset.iter_mut().enumerate() {
+            // A bound that falls must not brake the foot at once.
+            let bound = bound.max(0.95 * offset.speed().abs());
+            let next = free[axis] + offset.step(0.0, RETURN_RATE, bound, dt_s);
+            if dt_s > 0.0 {
+                self.velocity[axis] = (next - self.at[axis]) / dt_s;
+            }
+            self.at[axis] = next;
+        }
+    }
 }
 
 /// Pins of all feet of a body.
@@ -74,17 +120,20 @@ impl Pins {
     }
 
     /// One step: `votes` says for each foot how much of the motion has it on the ground, 0..1 (not a
-    /// number: the motion does not tell). Moves the
-    /// legs of `pose`, whose body is at `root`. Allocates nothing.
+    /// number: the motion does not tell). Moves the legs of `pose`, whose body is at `root`. Allocates
+    /// nothing.
     pub fn step(&mut self, votes: &[f64], root: &RootPose, dt_s: f64, pose: &mut [f64]) {
         for (i, pin) in self.pins.iter_mut().enumerate() {
             let free = root.to_world(self.feet.position(pose, i));
             if !self.begun {
-                pin.at = free;
-                pin.free = free;
+                (pin.at, pin.free) = (free, free);
             }
             let way = free - pin.free;
-            pin.free = free;
+            let free_velocity = if dt_s > 0.0 {
+                way / dt_s
+            } else {
+                Vector3::zeros()
+            };
             let wanted = if pin.on_ground { RELEASE } else { CONTACT };
             let down = if votes[i].is_finite() {
                 votes[i] > wanted
@@ -92,55 +141,45 @@ impl Pins {
                 // The motion does not tell: low and slow is on the ground.
                 let reach_m = self.feet.reach_m(i);
                 let low = free.z - self.ground_m[i] < LOW * reach_m;
-                low && way.norm() < SLOW_PER_S * reach_m * dt_s
+                low && free_velocity.norm() < SLOW_PER_S * reach_m
             };
-            let before = pin.at;
             if down {
-                // What moved the foot in flight ebbs away.
-                let fade = (-LANDING_RATE * dt_s).exp();
-                pin.velocity *= fade;
-                pin.velocity.z = 0.0;
-                pin.at += pin.velocity * dt_s;
-                pin.at.z += (1.0 - fade) * (self.ground_m[i] - pin.at.z);
-                for (axis, offset) in pin.offset.iter_mut().enumerate() {
-                    *offset = Follower::at(pin.at[axis] - free[axis]);
-                }
+                pin.stand(self.ground_m[i], dt_s);
             } else {
-                for offset in &mut pin.offset {
-                    offset.step(0.0, RETURN_RATE, 1e3, dt_s);
-                }
-                let goal = free + shift(&pin.offset);
-                pin.at = before + clamp_speed(goal - before, way);
-                // What the clamp held back is still to be made up for.
-                for (axis, offset) in pin.offset.iter_mut().enumerate() {
-                    offset.value = pin.at[axis] - free[axis];
-                }
-                if dt_s > 0.0 {
-                    pin.velocity = (pin.at - before) / dt_s;
-                }
+                pin.fly(free, free_velocity, dt_s);
             }
             pin.on_ground = down;
-            if (pin.at - free).norm() > 1e-9 {
-                let left = self.feet.place(pose, i, root.to_local(pin.at));
-                if left > OUT_OF_REACH_M {
-                    pin.at = root.to_world(self.feet.position(pose, i));
-                }
-            }
+            pin.free = free;
         }
         self.begun = true;
+        self.place_feet(root, pose);
     }
-}
 
-fn shift(offset: &[Follower; 3]) -> Vector3<f64> {
-    Vector3::new(offset[0].value, offset[1].value, offset[2].value)
-}
-
-/// `way` of one step, not faster or slower than the unconstrained way allows.
-fn clamp_speed(way: Vector3<f64>, free: Vector3<f64>) -> Vector3<f64> {
-    let (speed, wanted) = (way.norm(), free.norm());
-    if speed < 1e-12 || wanted < 1e-6 {
-        return way;
+    /// Puts the feet where they are to be. Where a leg that stands is too short (or cannot fold so far) the
+    /// body gives way; what then is still missing moves the pin.
+    fn place_feet(&mut self, root: &RootPose, pose: &mut [f64]) {
+        for round in 0..=BODY_ROUNDS {
+            let mut missing = Vector3::zeros();
+            for (i, pin) in self.pins.iter_mut().enumerate() {
+                let goal = root.to_local(pin.at);
+                let here = self.feet.position(pose, i);
+                if (goal - here).norm() < 1e-9 {
+                    continue;
+                }
+                if self.feet.place(pose, i, goal) < OUT_OF_REACH_M {
+                    continue;
+                }
+                let here = self.feet.position(pose, i);
+                if round == BODY_ROUNDS || !pin.on_ground {
+                    pin.at = root.to_world(here);
+                } else if (goal - here).norm() > missing.norm() {
+                    missing = goal - here;
+                }
+            }
+            if missing == Vector3::zeros() {
+                return;
+            }
+            self.feet.shift(pose, missing);
+        }
     }
-    let allowed = speed.clamp((1.0 - FLIGHT_SPEED) * wanted, (1.0 + FLIGHT_SPEED) * wanted);
-    way * (allowed / speed)
 }

@@ -14,6 +14,16 @@ impl Follower {
         Self { value, speed: 0.0 }
     }
 
+    /// A follower at `value` that moves with `speed`.
+    pub fn moving(value: f64, speed: f64) -> Self {
+        Self { value, speed }
+    }
+
+    /// Present speed, units/s.
+    pub fn speed(&self) -> f64 {
+        self.speed
+    }
+
     /// One step of `dt_s` towards `goal`. `rate` (1/s) sets how fast: 95 % of a step after about
     /// `4.7 / rate` seconds. `max_speed` bounds the speed (units/s).
     pub fn step(&mut self, goal: f64, rate: f64, max_speed: f64, dt_s: f64) -> f64 {

@@ -25,6 +25,9 @@
 //! crossfade_s = 0.1             # the end of the loop fades into what precedes `from`
 //! speed = 0.8                   # times as fast as recorded (default 1)
 //! size = 0.7                    # times as large, about the mean pose of from..to (default 1)
+//! reverse = true                # a loop backwards (default false)
+//! shift_m = [0.0, 0.1, 0.0]     # the whole pose moved, metres (default: not)
+//! turn_rad = 0.4                # and turned about the vertical through its first point (default: not)
 //! duration_s = 8.0
 //! join_s = 0.5                  # eased blend out of the segment before (default 0.4)
 //!
@@ -46,16 +49,15 @@
 //!   the other. Turning and shape are blended apart, as a hand turns between two postures without
 //!   shrinking half-way. A loop that follows a loop over the same stretch takes over its phase.
 
-use super::{GlobalFit, GlobalOptions, PoseError, PoseHeader, PoseSample, Recording};
+mod source;
+
+use super::{PoseError, PoseHeader, PoseSample, Recording};
 use crate::base::random::SplitMix;
 use serde::Deserialize;
+use source::{Source, add, blend, mix, smooth_step};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Deviation of the Gaussian that splits a recording into motion and noise, seconds.
-const SPLIT_SIGMA_S: f64 = 0.012;
-/// Residuals beyond this many usual sizes (median of the modulus, per coordinate) are motion.
-const NOISE_REACH: f64 = 4.0;
 /// Shortest step of a composed stream: what its time stamps can show.
 const SHORTEST_STEP_S: f64 = 2e-4;
 /// Longest composed stream in seconds.
@@ -94,6 +96,12 @@ struct SegmentTable {
     size: f64,
     #[serde(default)]
     crossfade_s: f64,
+    #[serde(default)]
+    reverse: bool,
+    #[serde(default)]
+    shift_m: [f64; 3],
+    #[serde(default)]
+    turn_rad: f64,
     #[serde(default = "default_join")]
     join_s: f64,
 }
@@ -107,139 +115,6 @@ fn default_join() -> f64 {
 }
 
 type Pose = Vec<[f64; 3]>;
-
-/// A recording split into motion and noise.
-struct Source {
-    times: Vec<f64>,
-    smooth: Vec<Pose>,
-    residual: Vec<Pose>,
-}
-
-impl Source {
-    fn new(recording: &Recording) -> Result<Self, String> {
-        let rows = recording.filled()?;
-        let times: Vec<f64> = recording.samples.iter().map(|s| s.t).collect();
-        let mut smooth = Vec::with_capacity(rows.len());
-        for t in &times {
-            let reach = 4.0 * SPLIT_SIGMA_S;
-            let first = times.partition_point(|other| *other < t - reach);
-            let last = times.partition_point(|other| *other <= t + reach);
-            let mut pose: Pose = vec![[0.0; 3]; recording.header.points.len()];
-            let mut total = 0.0;
-            for k in first..last {
-                let u = (times[k] - t) / SPLIT_SIGMA_S;
-                let weight = (-0.5 * u * u).exp();
-                total += weight;
-                add(&mut pose, &rows[k], weight);
-            }
-            scale(&mut pose, 1.0 / total);
-            smooth.push(pose);
-        }
-        let mut residual: Vec<Pose> = rows
-            .iter()
-            .zip(&smooth)
-            .map(|(row, smooth)| {
-                let mut rest = row.clone();
-                add(&mut rest, smooth, -1.0);
-                rest
-            })
-            .collect();
-        for point in 0..recording.header.points.len() {
-            for axis in 0..3 {
-                let mut sizes: Vec<f64> = residual.iter().map(|r| r[point][axis].abs()).collect();
-                sizes.sort_by(f64::total_cmp);
-                let reach = NOISE_REACH * sizes[sizes.len() / 2];
-                for row in &mut residual {
-                    row[point][axis] = row[point][axis].clamp(-reach, reach);
-                }
-            }
-        }
-        Ok(Self {
-            times,
-            smooth,
-            residual,
-        })
-    }
-
-    fn span(&self) -> (f64, f64) {
-        (
-            self.times.first().copied().unwrap_or(0.0),
-            self.times.last().copied().unwrap_or(0.0),
-        )
-    }
-
-    /// The smooth part at `t`, held beyond the ends.
-    fn at(&self, t: f64) -> Pose {
-        let after = self.times.partition_point(|time| *time <= t);
-        if after == 0 || after == self.times.len() {
-            return self.smooth[after.saturating_sub(1)].clone();
-        }
-        let span = self.times[after] - self.times[after - 1];
-        let u = (t - self.times[after - 1]) / span;
-        mix(&self.smooth[after - 1], &self.smooth[after], u)
-    }
-
-    fn mean(&self, from: f64, to: f64) -> Pose {
-        let mut pose = vec![[0.0; 3]; self.smooth[0].len()];
-        const STEPS: usize = 200;
-        for k in 0..STEPS {
-            let t = from + (to - from) * (k as f64 + 0.5) / STEPS as f64;
-            add(&mut pose, &self.at(t), 1.0 / STEPS as f64);
-        }
-        pose
-    }
-}
-
-fn add(pose: &mut [[f64; 3]], other: &[[f64; 3]], weight: f64) {
-    for (a, b) in pose.iter_mut().zip(other) {
-        for axis in 0..3 {
-            a[axis] += weight * b[axis];
-        }
-    }
-}
-
-fn scale(pose: &mut [[f64; 3]], factor: f64) {
-    for value in pose.as_flattened_mut() {
-        *value *= factor;
-    }
-}
-
-fn mix(a: &[[f64; 3]], b: &[[f64; 3]], u: f64) -> Pose {
-    let mut pose = a.to_vec();
-    scale(&mut pose, 1.0 - u);
-    add(&mut pose, b, u);
-    pose
-}
-
-/// The pose a share `u` of the way from `a` to `b`: place, yaw and shape each go their own way.
-fn blend(header: &PoseHeader, a: &[[f64; 3]], b: &[[f64; 3]], u: f64) -> Pose {
-    let fit = match GlobalFit::new(header, a, &GlobalOptions::default()) {
-        Ok(fit) if header.points.len() >= 3 => fit,
-        // One or two points are no body that could turn.
-        _ => return mix(a, b, u),
-    };
-    let mut turned = b.to_vec();
-    let motion = fit.remove(b, None, &mut turned);
-    // `turned` lies on `a` but for its shape; where b's height was kept it still has it.
-    let mut pose = mix(a, &turned, u);
-    let body = fit.body(&pose);
-    let (sin, cos) = (u * motion.yaw_rad).sin_cos();
-    let rise = u * fit.removed_rise(b);
-    for place in &mut pose {
-        let (x, z) = (place[0] - body[0], place[2] - body[2]);
-        *place = [
-            x * cos + z * sin + body[0] + u * motion.x_m,
-            place[1] + rise,
-            z * cos - x * sin + body[2] + u * motion.z_m,
-        ];
-    }
-    pose
-}
-
-fn smooth_step(u: f64) -> f64 {
-    let u = u.clamp(0.0, 1.0);
-    u * u * (3.0 - 2.0 * u)
-}
 
 /// A segment ready to play.
 struct Segment {
@@ -256,11 +131,29 @@ struct Segment {
     center: Pose,
     /// Where in the loop it starts, seconds of the recording.
     start: f64,
+    /// A loop runs backwards.
+    reverse: bool,
+    /// The whole pose is turned about the vertical through the recording's first point, then moved.
+    turn_rad: f64,
+    shift_m: [f64; 3],
 }
 
 impl Segment {
     /// The smooth pose `u` seconds after the segment's start; also beyond its end.
     fn at(&self, sources: &[Source], u: f64) -> Pose {
+        let mut pose = self.in_place(sources, u);
+        let centre = pose.first().copied().unwrap_or_default();
+        let (sin, cos) = self.turn_rad.sin_cos();
+        for p in &mut pose {
+            let [x, z] = [p[0] - centre[0], p[2] - centre[2]];
+            p[0] = centre[0] + cos * x + sin * z + self.shift_m[0];
+            p[1] += self.shift_m[1];
+            p[2] = centre[2] - sin * x + cos * z + self.shift_m[2];
+        }
+        pose
+    }
+
+    fn in_place(&self, sources: &[Source], u: f64) -> Pose {
         let source = &sources[self.source];
         let mut pose = match self.kind {
             Kind::Hold => return self.center.clone(),
@@ -271,7 +164,8 @@ impl Segment {
             }
             Kind::Loop => {
                 let length = self.to - self.from;
-                let p = (self.start + u * self.speed).rem_euclid(length);
+                let on = if self.reverse { -u } else { u };
+                let p = (self.start + on * self.speed).rem_euclid(length);
                 let pose = source.at(self.from + p);
                 let into = p - (length - self.crossfade);
                 if into > 0.0 {
@@ -395,6 +289,14 @@ fn segments_of(
             }
         };
         within("duration_s", duration, 0.01, LONGEST_S - total)?;
+        if table.reverse && table.kind != Kind::Loop {
+            let what = "is for loops; a cut runs backwards with `to` before `from`".into();
+            return Err(wrong(&key("reverse"), what));
+        }
+        within("turn_rad", table.turn_rad, -3.2, 3.2)?;
+        for axis in table.shift_m {
+            within("shift_m", axis, -10.0, 10.0)?;
+        }
         if table.kind == Kind::Cut {
             within("to", length.abs(), 0.01, LONGEST_S).map_err(|_| {
                 wrong(
@@ -424,7 +326,12 @@ fn segments_of(
             && table.kind == Kind::Loop
             && (before.source, before.from, before.to) == (source, table.from, to)
         {
-            start = (before.start + before.duration * before.speed).rem_euclid(length);
+            let on = if before.reverse {
+                -before.duration
+            } else {
+                before.duration
+            };
+            start = (before.start + on * before.speed).rem_euclid(length);
         }
         segments.push(Segment {
             kind: table.kind,
@@ -438,6 +345,9 @@ fn segments_of(
             join: table.join_s,
             center: sources[source].mean(table.from, to),
             start,
+            reverse: table.reverse,
+            turn_rad: table.turn_rad,
+            shift_m: table.shift_m,
         });
     }
     if segments.is_empty() {

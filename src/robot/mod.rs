@@ -8,6 +8,7 @@ pub mod envelope;
 pub mod ik;
 pub mod kinematics;
 pub mod leg;
+mod limits;
 pub mod model;
 pub mod tip;
 

@@ -114,8 +114,6 @@ pub enum ModelError {
 
 /// Beyond this a limit is a placeholder, not a servo's: 100 turns a second.
 pub const ABSURD_VELOCITY_RAD_S: f64 = 628.0;
-/// A revolute joint with more room than this is not kept off anything by its limits: one turn.
-const ODD_SPAN_RAD: f64 = 6.3;
 
 impl RobotModel {
     /// Reads a URDF and checks what the format leaves open: one tree, known links, finite numbers,
@@ -252,70 +250,6 @@ impl RobotModel {
             Some(m) => (m.joint, m.multiplier, m.offset),
             None => (joint, 1.0, 0.0),
         }
-    }
-
-    /// Joints that move whose velocity limit is a placeholder.
-    pub fn placeholder_velocities(&self) -> Vec<&Joint> {
-        self.actuated
-            .iter()
-            .map(|j| &self.joints[*j])
-            .filter(|j| j.limits.is_some_and(|l| l.velocity > ABSURD_VELOCITY_RAD_S))
-            .collect()
-    }
-
-    /// Turning joints whose position limits leave more than a turn, so that they keep it off nothing.
-    pub fn wide_ranges(&self) -> Vec<&Joint> {
-        self.actuated
-            .iter()
-            .map(|j| &self.joints[*j])
-            .filter(|j| {
-                let span = j.limits.map_or(0.0, |l| l.upper - l.lower);
-                j.kind == JointKind::Revolute && span > ODD_SPAN_RAD
-            })
-            .collect()
-    }
-
-    /// No joint may be faster than `velocity` (rad/s, above 0).
-    pub fn cap_velocity(&mut self, velocity: f64) {
-        for limits in self.joints.iter_mut().filter_map(|j| j.limits.as_mut()) {
-            limits.velocity = limits.velocity.min(velocity);
-        }
-    }
-
-    /// Gives joint `name` other position limits. Legs found before keep the old ones.
-    pub fn set_range(&mut self, name: &str, lower: f64, upper: f64) -> Result<(), ModelError> {
-        let bad = |problem: String| ModelError::Joint {
-            joint: name.into(),
-            problem,
-        };
-        // Written so that NaN fails.
-        if !(lower < upper) {
-            return Err(bad(format!(
-                "limits {lower}..{upper} leave no room to move"
-            )));
-        }
-        let moving = self.joint_names();
-        let limits = self
-            .joints
-            .iter_mut()
-            .find(|j| j.name == name)
-            .and_then(|j| j.limits.as_mut());
-        let limits = limits.ok_or_else(|| {
-            bad(format!(
-                "is not a joint that moves; those are {}",
-                moving.join(", ")
-            ))
-        })?;
-        (limits.lower, limits.upper) = (lower, upper);
-        Ok(())
-    }
-
-    /// Positions nearest to zero that the limits allow, in joint order.
-    pub fn rest(&self) -> Vec<f64> {
-        self.limits()
-            .iter()
-            .map(|l| 0.0_f64.clamp(l.lower, l.upper))
-            .collect()
     }
 
     /// Index of a link by name.

@@ -11,7 +11,9 @@ mod radial;
 
 pub use parameters::{DIMENSION_NAMES, MOST_DIMENSIONS, Parameters};
 
-use radial::{Radial, distance_sq};
+use radial::Radial;
+
+pub(super) use radial::distance_sq;
 
 /// How weights follow from the place in parameter space.
 #[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
@@ -187,11 +189,10 @@ impl Weights {
     pub fn at(&self, wish: impl Into<Parameters>, out: &mut [f64]) {
         let wish: Parameters = wish.into();
         let wish = wish.padded();
-        // `max` before `min`, so that not-a-number becomes the low edge.
+        // Written so that not-a-number becomes the low edge.
         let p: [f64; MOST_DIMENSIONS] = std::array::from_fn(|d| {
-            ((wish[d] - self.low[d]) * self.inverse_span[d])
-                .max(0.0)
-                .min(1.0)
+            let x = (wish[d] - self.low[d]) * self.inverse_span[d];
+            if x > 0.0 { x.min(1.0) } else { 0.0 }
         });
         let out = &mut out[..self.centres.len()];
         match &self.map {

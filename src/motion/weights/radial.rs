@@ -109,7 +109,7 @@ fn add_scaled(out: &mut [f64], column: &[f64], by: f64) {
 
 /// Squared distance of two points with unused dimensions zero.
 #[inline]
-pub(super) fn distance_sq(a: &Point, b: &Point) -> f64 {
+pub(in crate::motion) fn distance_sq(a: &Point, b: &Point) -> f64 {
     let mut sum = 0.0;
     for d in 0..MOST_DIMENSIONS {
         sum += (a[d] - b[d]) * (a[d] - b[d]);
