@@ -4,7 +4,10 @@
 //! poses are f64. Reference: ozz-animation 0.16 (C++, SIMD, f32, keyframes compressed), built with -O3 and run on a
 //! machine like this one: 60 joints, 4 clips to model space 3.2 to 5.1 us; 6 clips and 3 additive layers 7 to
 //! 11 us; 850 to 1260 such characters at 60 Hz on one core. Run alone, or compare medians of several runs: beside
-//! other work on the same cores the figures here doubled.
+//! other work on the same cores the figures here doubled and more.
+//!
+//! Here, medians of three quiet runs, time forward or random: 12 hinges of 4 clips 0.09 us, with all links 0.35 us; 60
+//! joints of 4 clips to model space 2.2 us; of 6 clips and 3 layers 4.3 us, 3,900 characters at 60 Hz.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
