@@ -148,6 +148,8 @@ impl Gestures {
 struct Ramp {
     from: Vec<f64>,
     to: Vec<f64>,
+    /// Room for both, where poses hold rotations and are blended by the body; else empty.
+    pair: Vec<f64>,
     seconds: f64,
 }
 
@@ -172,6 +174,10 @@ impl Puppet {
         options: PuppetOptions,
     ) -> Self {
         let (joints, coordinates) = (end_pose.len(), animator.coordinates());
+        let parts = animator.space().parts().iter();
+        let rotations = parts
+            .clone()
+            .any(|p| p.coordinates.len() != p.tangent.len());
         let estimates = front.estimates().to_vec();
         let channels = vec![f64::NAN; front.channel_names().len()];
         Self {
@@ -191,6 +197,7 @@ impl Puppet {
             ramp: Ramp {
                 from: vec![0.0; joints],
                 to: vec![0.0; joints],
+                pair: vec![0.0; if rotations { 2 * joints } else { 0 }],
                 seconds: 0.0,
             },
             playing_since: None,
@@ -427,8 +434,16 @@ impl Puppet {
     fn follow_ramp(&mut self, now: Time) -> bool {
         let u = now.secs_since(self.stage_since) / self.ramp.seconds.max(1e-9);
         let w = ease(u);
-        for ((pose, from), to) in self.pose.iter_mut().zip(&self.ramp.from).zip(&self.ramp.to) {
-            *pose = from + w * (to - from);
+        if self.ramp.pair.is_empty() {
+            for ((pose, from), to) in self.pose.iter_mut().zip(&self.ramp.from).zip(&self.ramp.to) {
+                *pose = from + w * (to - from);
+            }
+        } else {
+            let (from, to) = self.ramp.pair.split_at_mut(self.ramp.from.len());
+            from.copy_from_slice(&self.ramp.from);
+            to.copy_from_slice(&self.ramp.to);
+            let weights = [1.0 - w, w];
+            (self.animator.space()).blend(&self.ramp.pair, &weights, &mut self.pose);
         }
         u >= 1.0
     }

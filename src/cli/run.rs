@@ -50,6 +50,7 @@ pub const EXAMPLES: &str = "Examples:
   my_tracker | handwave run my_robot.toml --input -   live from a pipe (JSON Lines or CSV)
   handwave run --scale 1.5                            a small hand (its poses enlarged to the gestures' size)
   handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
+  handwave run configs/fox.toml --headless --speed max --targets fox.csv   an avatar: rotations, no servos
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
 Ctrl-C once: the robot comes to rest, lies down, torque goes off. Twice: torque goes off at once.
@@ -117,6 +118,16 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         }
     }
     .map_err(Failure::input)?;
+    if let (Some(avatar), true) = (
+        &character.body.avatar,
+        options.bus.is_some() || !options.fault.is_empty(),
+    ) {
+        return Err(Failure::input(format!(
+            "--bus and --fault are for servos; {} is an avatar of {} joints and has none: leave them out",
+            character.name,
+            avatar.skeleton.len()
+        )));
+    }
     if let Some(bus) = &options.bus {
         character.bus = bus
             .parse()
@@ -170,7 +181,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         .targets
         .as_ref()
         .map(|path| {
-            TargetsFile::create(path, &character.joints)
+            TargetsFile::create(path, &character)
                 .map_err(|e| Failure::input(format!("--targets {}: {e}", path.display())))
         })
         .transpose()?;

@@ -26,6 +26,7 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
         .collect();
     json!({
         "ending": ending_word(&report.ending),
+        "avatar": character.body.avatar.is_some(),
         "cycles": stats.cycles, "overruns": stats.overruns, "missed_cycles": stats.missed,
         "envelope_cycles": stats.held_back,
         "transitions": report.transitions.completed, "transitions_aborted": report.transitions.aborted,
@@ -127,6 +128,9 @@ fn tracking_lines(report: &Report) -> String {
 }
 
 fn torque_lines(report: &Report, character: &Character) -> String {
+    if character.body.avatar.is_some() {
+        return "servos        none: an avatar\n".into();
+    }
     let torque = match &report.torque {
         None => return "torque        stays on, as safety.on_exit says\n".into(),
         Some(Err(error)) => return format!("torque        UNKNOWN, not read back: {error}\n"),
@@ -146,6 +150,9 @@ fn torque_lines(report: &Report, character: &Character) -> String {
 /// One line per servo and kind of fault, with the first few times; faults that struck all servos at
 /// once are those of the line, not of a servo, and get one line together.
 fn fault_lines(report: &Report, character: &Character) -> String {
+    if character.servos.is_empty() {
+        return String::new();
+    }
     let stats = &report.stats;
     let at_once = |fault: &ServoFault| {
         let same = |f: &&ServoFault| f.kind == fault.kind && f.from_s == fault.from_s;

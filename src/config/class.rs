@@ -114,6 +114,10 @@ pub(super) fn class_parts(
         let gesture = (class.gesture.as_ref())
             .map(|entry| gesture_named(entry, "class.gesture", gestures, at))
             .transpose()?;
+        if let (Some(path), Some(_)) = (&class.map, &body.avatar) {
+            let problem = "a pose map drives a robot; a class of an avatar has clips";
+            return Err(at.at(path.span(), "class.map", problem));
+        }
         if let Some(path) = &class.map {
             parts.push(direct_parts(
                 files, file, class, path, joints, limits, gesture, at,
@@ -131,6 +135,15 @@ pub(super) fn class_parts(
             ));
         }
         let (extra, names) = extra_parts(class, at)?;
+        let kind = match (gesture, play) {
+            (_, Play::Loop) => Some(ClipKind::Cycle),
+            (_, Play::Once) => Some(ClipKind::Path),
+            (Some(gesture), Play::Gesture) => Some(match gestures.gestures[gesture].kind {
+                GestureKind::Cyclic => ClipKind::Cycle,
+                GestureKind::NonCyclic => ClipKind::Path,
+            }),
+            (None, Play::Gesture) => None,
+        };
         let mut examples = Vec::new();
         for entry in &class.clip {
             let in_range = (0.0..=10.0).contains(&entry.amplitude)
@@ -145,7 +158,7 @@ pub(super) fn class_parts(
                     ),
                 ));
             }
-            let clip = clip(files, &entry.file, "class.clip.file", body, at)?;
+            let clip = clip(files, &entry.file, "class.clip.file", body, kind, at)?;
             if clip.kind == ClipKind::Cycle && entry.amplitude > 0.0 && entry.frequency_hz <= 0.0 {
                 return Err(at.at(
                     entry.file.span(),

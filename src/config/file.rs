@@ -27,10 +27,12 @@ pub struct CharacterFile {
     /// Edges and thresholds.
     #[serde(default)]
     pub graph: GraphEntry,
-    /// The robot.
-    pub robot: RobotEntry,
+    /// The robot; it needs a bus.
+    pub robot: Option<RobotEntry>,
     /// The bus.
-    pub bus: BusEntry,
+    pub bus: Option<BusEntry>,
+    /// Instead of robot and bus: an avatar.
+    pub avatar: Option<AvatarEntry>,
     /// Ramps, safe states, what to do when something is lost.
     #[serde(default)]
     pub safety: SafetyEntry,
@@ -280,6 +282,38 @@ pub struct RobotEntry {
     pub joint: Vec<JointEntry>,
 }
 
+/// An avatar: a skeleton that is played without servos. Commented in `configs/fox.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AvatarEntry {
+    /// Path of a file with the skeleton: glTF, BVH, AMC.
+    pub model: Spanned<String>,
+    /// Metres per unit of length of the model and of its clips; as the format says when not given.
+    pub unit_m: Option<f64>,
+    /// Control cycles per second.
+    #[serde(default = "control_rate")]
+    pub rate_hz: f64,
+    /// Limbs that stand on the ground.
+    #[serde(default)]
+    pub limb: Vec<LimbEntry>,
+    /// Feet that stand on the ground stay where they are, by turning the limb's joints; quick motion jerks.
+    #[serde(default)]
+    pub pin_feet: bool,
+}
+
+/// A limb of an avatar.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimbEntry {
+    /// Limb name.
+    pub name: String,
+    /// The joint that touches the ground.
+    pub end: Spanned<String>,
+    /// How many joints above it the limb has.
+    #[serde(default = "two_joints")]
+    pub joints: usize,
+}
+
 /// One joint and its servo.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -424,6 +458,9 @@ fn one() -> f64 {
 }
 fn yes() -> bool {
     true
+}
+fn two_joints() -> usize {
+    2
 }
 fn two() -> f64 {
     2.0

@@ -137,7 +137,7 @@ impl ClipFile {
         Ok(file)
     }
 
-    /// JSON text, one line per frame, numbers rounded to a micro-radian and a micrometre.
+    /// JSON text, one line per frame, numbers rounded to a micro-radian.
     pub fn to_json(&self) -> String {
         let round = |v: f64| (v * 1e6).round() / 1e6 + 0.0;
         let rows = |rows: &mut dyn Iterator<Item = &[f64]>| {
