@@ -51,6 +51,30 @@ impl ClassParts {
         &self.examples
     }
 
+    /// What drives the class, in words.
+    pub fn driven_by(&self, gestures: &GestureSet) -> String {
+        let by = match (
+            self.gesture.and_then(|g| gestures.gestures.get(g)),
+            &self.channel,
+        ) {
+            (Some(gesture), _) => {
+                let sense = if self.reverse {
+                    ", in the opposite sense"
+                } else {
+                    ""
+                };
+                format!("gesture {} ({}{sense})", gesture.name, gesture.kind.name())
+            }
+            (None, Some(channel)) => format!("channel {}", channel.channel),
+            (None, None) => "no gesture: played while nothing is performed".into(),
+        };
+        match self.options.play {
+            Play::Gesture => by,
+            Play::Once => format!("{by}; played once by the clock"),
+            Play::Loop => format!("{by}; round and round by the clock"),
+        }
+    }
+
     /// Names of the example clips, in the order of the class's weights.
     pub fn clip_names(&self) -> Vec<String> {
         self.examples.iter().map(|e| e.clip.name.clone()).collect()
