@@ -30,6 +30,7 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
         "cycles": stats.cycles, "overruns": stats.overruns, "missed_cycles": stats.missed,
         "envelope_cycles": stats.held_back,
         "transitions": report.transitions.completed, "transitions_aborted": report.transitions.aborted,
+        "transitions_interrupted": report.transitions.interrupted, "transitions_refused": report.transitions.refused,
         "samples": stats.samples, "samples_dropped": dropped, "samples_refused": report.refused,
         "points_rejected": report.tracking.outliers, "points_filled": report.tracking.filled,
         "sides_swapped": report.tracking.swapped, "performer_scale": report.performer_scale,
@@ -63,7 +64,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         "{}: {}\n\
          cycles        {}, overruns {} ({:.2} %), bus late {} ({:.2} %)\n\
          envelope      acted in {} cycles\n\
-         transitions   {} done, {} aborted\n\
+         transitions   {}\n\
          poses         {} used, {} dropped{}\n\
          bus           {} replies missing, damage {} (stray bytes, wrong checksums), {:.1} MB\n\
          pose to wire  {}\n\
@@ -78,8 +79,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         stats.missed,
         share(stats.missed),
         stats.held_back,
-        report.transitions.completed,
-        report.transitions.aborted,
+        transitions(report),
         stats.samples,
         report.dropped.total() + report.before_header + report.refused,
         reasons(report),
@@ -227,4 +227,19 @@ fn ending_word(ending: &Ending) -> &'static str {
         Ending::SafetyStop(_) => "safety stop",
         Ending::Bus(_) => "bus failure",
     }
+}
+
+/// Transitions in words; what did not happen is not told.
+fn transitions(report: &Report) -> String {
+    let counts = &report.transitions;
+    let mut text = format!("{} done, {} aborted", counts.completed, counts.aborted);
+    for (count, word) in [
+        (counts.interrupted, "interrupted"),
+        (counts.refused, "refused: nothing similar"),
+    ] {
+        if count > 0 {
+            text.push_str(&format!(", {count} {word}"));
+        }
+    }
+    text
 }
