@@ -9,6 +9,7 @@ use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files, GestureFiles};
 use crate::gesture::PerformerScale;
 use crate::live::control::Ending;
+use crate::live::footing::{Footing, Slides};
 use crate::live::reload::News;
 use crate::live::session::{self, Observer, Report, Session};
 use crate::live::source::{self, Source};
@@ -192,6 +193,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         targets,
         display: Display::Quiet,
         newest: CycleRecord::default(),
+        footing: character.body.feet.clone().map(Footing::new),
         later: Vec::new(),
     };
     let report = match options.speed {
@@ -224,7 +226,8 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         warn(format_args!("{line}"));
     }
     let written = onlooker.targets.map_or(Ok(()), TargetsFile::finish);
-    conclude(options, report, written, &character)
+    let slides = onlooker.footing.map(|f| f.slides());
+    conclude(options, report, slides, written, &character)
 }
 
 fn faults(options: &RunOptions, character: &Character) -> Result<Vec<FaultSpec>, Failure> {
@@ -312,15 +315,19 @@ fn session(
 fn conclude(
     options: &RunOptions,
     report: Report,
+    slides: Option<Slides>,
     written: Result<(), String>,
     character: &Character,
 ) -> Result<ExitStatus, Failure> {
     if options.json {
-        say(format_args!("{}", summary::to_json(&report, character)));
+        say(format_args!(
+            "{}",
+            summary::to_json(&report, slides, character)
+        ));
     } else {
         say(format_args!(
             "{}",
-            summary::to_text(&report, character).trim_end()
+            summary::to_text(&report, slides, character).trim_end()
         ));
     }
     let end = |status, message: String| Failure { status, message };
@@ -367,6 +374,7 @@ struct Onlooker {
     targets: Option<TargetsFile>,
     display: Display,
     newest: CycleRecord,
+    footing: Option<Footing>,
     /// What could not be said while the view had the terminal.
     later: Vec<String>,
 }
@@ -375,6 +383,9 @@ impl Observer for Onlooker {
     fn cycle(&mut self, record: &CycleRecord) {
         if let Some(targets) = &mut self.targets {
             targets.row(record);
+        }
+        if let Some(footing) = &mut self.footing {
+            footing.see(record);
         }
         self.newest.clone_from(record);
         self.display.count(record);

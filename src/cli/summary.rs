@@ -3,12 +3,13 @@
 use crate::config::Character;
 use crate::gesture::TrackingCounts;
 use crate::live::control::Ending;
+use crate::live::footing::Slides;
 use crate::live::session::Report;
 use crate::live::stats::{FaultKind, Percentiles, ServoFault};
 use serde_json::{Value, json};
 
 /// The summary as one JSON object.
-pub fn to_json(report: &Report, character: &Character) -> Value {
+pub fn to_json(report: &Report, slides: Option<Slides>, character: &Character) -> Value {
     let stats = &report.stats;
     let torque = report.torque.as_ref().and_then(|t| t.as_ref().ok());
     let faults: Vec<Value> = stats
@@ -31,6 +32,9 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
         "envelope_cycles": stats.held_back,
         "transitions": report.transitions.completed, "transitions_aborted": report.transitions.aborted,
         "transitions_interrupted": report.transitions.interrupted, "transitions_refused": report.transitions.refused,
+        "stances": slides.map(|s| s.stances),
+        "foot_slide_mm": slides.map(|s| 1e3 * s.targets_m),
+        "foot_slide_measured_mm": slides.map(|s| 1e3 * s.measured_m),
         "samples": stats.samples, "samples_dropped": dropped, "samples_refused": report.refused,
         "points_rejected": report.tracking.outliers, "points_filled": report.tracking.filled,
         "sides_swapped": report.tracking.swapped, "performer_scale": report.performer_scale,
@@ -48,7 +52,7 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
 }
 
 /// The summary as text.
-pub fn to_text(report: &Report, character: &Character) -> String {
+pub fn to_text(report: &Report, slides: Option<Slides>, character: &Character) -> String {
     let stats = &report.stats;
     let line = |p: Percentiles| format!("p50 {} us, p99 {} us, max {} us", p.p50, p.p99, p.max);
     if stats.cycles == 0 {
@@ -64,7 +68,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         "{}: {}\n\
          cycles        {}, overruns {} ({:.2} %), bus late {} ({:.2} %)\n\
          envelope      acted in {} cycles\n\
-         transitions   {}\n\
+         transitions   {}\n{}\
          poses         {} used, {} dropped{}\n\
          bus           {} replies missing, damage {} (stray bytes, wrong checksums), {:.1} MB\n\
          pose to wire  {}\n\
@@ -80,6 +84,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         share(stats.missed),
         stats.held_back,
         transitions(report),
+        standing(slides),
         stats.samples,
         report.dropped.total() + report.before_header + report.refused,
         reasons(report),
@@ -242,4 +247,16 @@ fn transitions(report: &Report) -> String {
         }
     }
     text
+}
+
+/// How well feet stood; nothing for a body without feet that are pinned.
+fn standing(slides: Option<Slides>) -> String {
+    slides.map_or(String::new(), |s| {
+        format!(
+            "feet          slid at most {:.2} mm in {} stances (servos, measured: {:.1} mm)\n",
+            1e3 * s.targets_m,
+            s.stances,
+            1e3 * s.measured_m
+        )
+    })
 }
