@@ -122,9 +122,18 @@ impl SearchParts {
         let levers = lever_arms(model);
         let height_m = levers.iter().copied().fold(0.0, f64::max);
         let mut made: Vec<Option<(ClipBlend, Arc<SearchClass>)>> = Vec::new();
-        for class in classes {
+        let wanted = |from: usize, to: usize| {
+            (self.edges.as_ref()).is_none_or(|list| list.contains(&(from, to)))
+                && can_search(&classes[from], &classes[to])
+        };
+        for (node, class) in classes.iter().enumerate() {
+            let used = edges
+                .iter()
+                .any(|(a, b)| (*a == node || *b == node) && wanted(*a, *b));
             // A class in which nothing moves, or a pose map, has nothing to search.
-            let blend = ClipBlend::new(&class.name, class.examples(), &levers).ok();
+            let blend = used
+                .then(|| ClipBlend::new(&class.name, class.examples(), &levers).ok())
+                .flatten();
             made.push(match blend {
                 Some(blend) => {
                     let search = blend.search_class(FRAMES, STEPS, height_m);
@@ -135,14 +144,10 @@ impl SearchParts {
         }
         let mut searches = Vec::new();
         for (from, to) in edges.iter().copied() {
-            let wanted = self
-                .edges
-                .as_ref()
-                .is_none_or(|list| list.contains(&(from, to)));
             let (Some(source), Some(target)) = (&made[from], &made[to]) else {
                 continue;
             };
-            if !wanted || !can_search(&classes[from], &classes[to]) {
+            if !wanted(from, to) {
                 continue;
             }
             let tables = DistanceTables::new(&source.1, &target.1).map_err(|e| e.to_string())?;
