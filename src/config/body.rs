@@ -54,19 +54,17 @@ impl Body {
         robot: &RobotEntry,
         at: &Pointer<'_>,
     ) -> Result<Self, ConfigError> {
-        let (legs, facing) = if robot.legs.is_empty() {
+        let legs = if robot.legs.is_empty() {
             // A robot without legs is no mistake.
-            Leg::find_all_facing(model, None).unwrap_or_default()
+            Leg::find_all(model).unwrap_or_default()
         } else {
             let to_foot = |(name, foot): (&String, &String)| Leg::to_foot(model, name, foot);
-            let legs = (robot.legs.iter().map(to_foot))
+            (robot.legs.iter().map(to_foot))
                 .collect::<Result<Vec<_>, _>>()
-                .map_err(|e| at.key("robot.legs", e))?;
-            let facing = Leg::facing(model, &legs);
-            (legs, facing)
+                .map_err(|e| at.key("robot.legs", e))?
         };
-        let feet = (robot.pin_feet && !legs.is_empty())
-            .then(|| RobotFeet::new(model.clone(), legs, facing));
+        let feet =
+            (robot.pin_feet && !legs.is_empty()).then(|| RobotFeet::new(model.clone(), legs));
         Ok(Self {
             space: BodySpace::Joints(JointSpace::of_robot(model, feet.is_some())),
             feet,
