@@ -10,6 +10,7 @@ use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
 use crate::motion::class::{Drive, EXTRA};
 use crate::motion::layer::{ChannelMap, LayerInput};
 use crate::motion::mapping::Seen;
+pub use crate::motion::node::ClassInput;
 use crate::motion::{Animator, ease};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
@@ -91,21 +92,6 @@ pub struct Targets {
     pub poses_lost: bool,
 }
 
-/// What drives a class.
-#[derive(Copy, Clone, Debug, Default, PartialEq)]
-pub struct ClassInput {
-    /// Index of its gesture in the front end; `None` for a pose map that needs none.
-    pub gesture: Option<usize>,
-    /// The gesture is to be performed in the opposite sense.
-    pub reverse: bool,
-    /// The channel that drives it in place of a gesture, by index in the front end.
-    pub channel: Option<(usize, ChannelMap)>,
-    /// Index of its feature in the front end, for a pose map.
-    pub feature: Option<usize>,
-    /// Channels that drive its parameters beside amplitude and frequency, by index in the front end.
-    pub extra: [Option<(usize, ChannelMap)>; EXTRA],
-}
-
 /// A character that is being played: gesture front end, animator, envelope and the stages of a run.
 pub struct Puppet {
     front: FrontEnd,
@@ -162,6 +148,8 @@ impl Gestures {
 struct Ramp {
     from: Vec<f64>,
     to: Vec<f64>,
+    /// Room for both, where poses hold rotations and are blended by the body; else empty.
+    pair: Vec<f64>,
     seconds: f64,
 }
 
@@ -186,6 +174,10 @@ impl Puppet {
         options: PuppetOptions,
     ) -> Self {
         let (joints, coordinates) = (end_pose.len(), animator.coordinates());
+        let parts = animator.space().parts().iter();
+        let rotations = parts
+            .clone()
+            .any(|p| p.coordinates.len() != p.tangent.len());
         let estimates = front.estimates().to_vec();
         let channels = vec![f64::NAN; front.channel_names().len()];
         Self {
@@ -205,6 +197,7 @@ impl Puppet {
             ramp: Ramp {
                 from: vec![0.0; joints],
                 to: vec![0.0; joints],
+                pair: vec![0.0; if rotations { 2 * joints } else { 0 }],
                 seconds: 0.0,
             },
             playing_since: None,
@@ -441,8 +434,16 @@ impl Puppet {
     fn follow_ramp(&mut self, now: Time) -> bool {
         let u = now.secs_since(self.stage_since) / self.ramp.seconds.max(1e-9);
         let w = ease(u);
-        for ((pose, from), to) in self.pose.iter_mut().zip(&self.ramp.from).zip(&self.ramp.to) {
-            *pose = from + w * (to - from);
+        if self.ramp.pair.is_empty() {
+            for ((pose, from), to) in self.pose.iter_mut().zip(&self.ramp.from).zip(&self.ramp.to) {
+                *pose = from + w * (to - from);
+            }
+        } else {
+            let (from, to) = self.ramp.pair.split_at_mut(self.ramp.from.len());
+            from.copy_from_slice(&self.ramp.from);
+            to.copy_from_slice(&self.ramp.to);
+            let weights = [1.0 - w, w];
+            (self.animator.space()).blend(&self.ramp.pair, &weights, &mut self.pose);
         }
         u >= 1.0
     }

@@ -258,7 +258,12 @@ fn files_that_the_configuration_names() {
 #[test]
 fn a_channel_that_the_stream_lacks() {
     let folder = Folder::of_configs();
-    folder.edit(CONFIG, "channel = \"yaw\"", "channel = \"yav\"");
+    // The layer's, not that of the class's parameter before it.
+    folder.edit(
+        CONFIG,
+        "channel = \"yaw\"          #",
+        "channel = \"yav\"          #",
+    );
     let file = folder.text(CONFIG);
     refused(
         run_virtual(&[&file]),
@@ -346,8 +351,13 @@ fn numbers_out_of_range() {
     }
     edited("watchdog_ms = 200", "watchdog_ms = -1", &["-1"]);
     edited(
-        "range = [-0.6, 0.6]",
-        "range = [0.6, 0.6]",
+        "range = [-0.6, 0.6]\ndead_zone",
+        "range = [0.6, 0.6]\ndead_zone",
         &["layer.range"],
+    );
+    edited(
+        "range = [-0.6, 0.6], dead_zone",
+        "range = [0.6, 0.6], dead_zone",
+        &["class.parameter.range"],
     );
 }

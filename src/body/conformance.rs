@@ -105,6 +105,14 @@ fn a_pose_plus_the_way_to_another_is_that_other() {
             space.diff(&a, &a, &mut way);
             let nothing = way.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             assert!(nothing < 1e-12, "{}: a to a is {nothing}", body.name);
+            for scale in [1.0, -1.0, 0.4] {
+                let (mut once, mut twice) = (b.clone(), b.clone());
+                space.diff(&a, &b, &mut way);
+                space.add(&mut twice, &way, scale);
+                space.add_way(&mut once, &a, &b, scale, &mut way);
+                let off = space.distance(&once, &twice);
+                assert!(off < 1e-9, "{}: {off} m off at scale {scale}", body.name);
+            }
             // Half the way is as far from one as from the other, along the way.
             space.diff(&a, &b, &mut way);
             let mut half = a.clone();

@@ -5,22 +5,28 @@
 //! ([`RootPose`]), which are kept beside them: what is compared and blended does not depend on where
 //! the body went.
 
+pub mod blend;
 mod feet;
 mod joint_space;
+mod robot_ends;
 mod robot_feet;
 mod root;
 mod side;
 mod skeleton;
+mod skeleton_ends;
 mod skeleton_feet;
 mod skeleton_space;
 mod skin;
 
+pub use blend::Blending;
 pub use feet::Feet;
 pub use joint_space::{BODY, JointSpace};
+pub use robot_ends::RobotEnds;
 pub use robot_feet::RobotFeet;
 pub use root::{RootAdvance, RootPose};
 pub use side::{Side, mirrored, other_side};
 pub use skeleton::{Skeleton, SkeletonError, SkeletonJoint};
+pub use skeleton_ends::SkeletonEnds;
 pub use skeleton_feet::{SkeletonFeet, SkeletonFeetError, SkeletonLeg};
 pub use skeleton_space::SkeletonSpace;
 pub use skin::{Influence, SkinBone, SkinError, SkinnedMesh};
@@ -75,6 +81,20 @@ pub trait PoseSpace: Send + Sync {
 
     /// Adds `scale` times a difference to `pose`.
     fn add(&self, pose: &mut [f64], difference: &[f64], scale: f64);
+
+    /// Adds `scale` times the way from pose `from` to pose `to` to `pose`: [`PoseSpace::diff`] and
+    /// [`PoseSpace::add`] in one. `difference` is room for a difference.
+    fn add_way(
+        &self,
+        pose: &mut [f64],
+        from: &[f64],
+        to: &[f64],
+        scale: f64,
+        difference: &mut [f64],
+    ) {
+        self.diff(from, to, difference);
+        self.add(pose, difference, scale);
+    }
 
     /// Euclidean features of a pose in the travelling frame, metres.
     fn embed(&self, pose: &[f64], out: &mut [f64]);

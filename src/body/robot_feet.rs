@@ -2,26 +2,23 @@
 
 use super::Feet;
 use super::joint_space::body_pose;
-use crate::robot::{Facing, Leg, RobotModel};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use crate::robot::{Leg, RobotModel};
+use nalgebra::{Point3, Vector3};
 
 /// Legs of a robot as [`Feet`]. Poses are those of a floating [`super::JointSpace`]: joints, then the
-/// body's place over the ground.
+/// body's place over the ground: the root link's own pose, whichever way its axes look.
 #[derive(Clone, Debug)]
 pub struct RobotFeet {
     model: RobotModel,
     legs: Vec<Leg>,
     joints: usize,
     reach_m: Vec<f64>,
-    /// From the root link to x forward, y left, z up.
-    facing: UnitQuaternion<f64>,
 }
 
 impl RobotFeet {
-    /// The feet of `legs`, of a robot whose root link looks where `facing` says.
-    pub fn new(model: RobotModel, legs: Vec<Leg>, facing: Facing) -> Self {
+    /// The feet of `legs`.
+    pub fn new(model: RobotModel, legs: Vec<Leg>) -> Self {
         Self {
-            facing: facing.rotation(),
             joints: model.actuated.len(),
             reach_m: legs.iter().map(|l| l.length(&model)).collect(),
             model,
@@ -46,14 +43,12 @@ impl Feet for RobotFeet {
 
     fn position(&self, pose: &[f64], foot: usize) -> Point3<f64> {
         let (joints, body) = pose.split_at(self.joints);
-        let foot = self.legs[foot].foot_position(&self.model, joints);
-        body_pose(body) * (self.facing * foot)
+        body_pose(body) * self.legs[foot].foot_position(&self.model, joints)
     }
 
     fn place(&self, pose: &mut [f64], foot: usize, goal: Point3<f64>) -> f64 {
         let (joints, body) = pose.split_at_mut(self.joints);
         let goal = body_pose(body).inverse_transform_point(&goal);
-        let goal = self.facing.inverse_transform_point(&goal);
         self.legs[foot].reach(goal, joints)
     }
 

@@ -79,33 +79,44 @@ impl PoseSpace for SkeletonSpace {
 
     fn blend(&self, poses: &[f64], weights: &[f64], out: &mut [f64]) {
         let len = self.len();
-        out.fill(0.0);
         // The heaviest pose decides the hemisphere, so that the order does not matter.
         let heaviest = (weights.iter().enumerate())
             .max_by(|a, b| a.1.total_cmp(b.1))
             .map_or(0, |(i, _)| i);
         let reference = &poses[heaviest * len..(heaviest + 1) * len];
+        out[..3].fill(0.0);
         for (pose, weight) in poses.chunks_exact(len).zip(weights) {
-            if *weight == 0.0 {
-                continue;
-            }
-            for i in 0..3 {
-                out[i] += weight * pose[i];
-            }
-            let joints = out[3..].chunks_exact_mut(4).zip(pose[3..].chunks_exact(4));
-            for ((out, q), r) in joints.zip(reference[3..].chunks_exact(4)) {
-                let dot = q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3];
-                let weight = if dot < 0.0 { -weight } else { *weight };
-                for i in 0..4 {
-                    out[i] += weight * q[i];
+            if *weight != 0.0 {
+                for (out, place) in out[..3].iter_mut().zip(pose) {
+                    *out += weight * place;
                 }
             }
         }
-        for (out, r) in out[3..]
-            .chunks_exact_mut(4)
-            .zip(reference[3..].chunks_exact(4))
-        {
-            normalise(out, r);
+        // Joint by joint: the sum stays in registers.
+        for (at, out) in (3..).step_by(4).zip(out[3..].chunks_exact_mut(4)) {
+            let r = &reference[at..at + 4];
+            let mut sum = [0.0; 4];
+            for (pose, weight) in poses.chunks_exact(len).zip(weights) {
+                if *weight == 0.0 {
+                    continue;
+                }
+                let q = &pose[at..at + 4];
+                let dot = q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3];
+                let weight = weight.copysign(dot);
+                for i in 0..4 {
+                    sum[i] += weight * q[i];
+                }
+            }
+            let squared = sum.iter().map(|v| v * v).sum::<f64>();
+            if squared > 1e-18 {
+                let scale = 1.0 / squared.sqrt();
+                for (out, v) in out.iter_mut().zip(sum) {
+                    *out = scale * v;
+                }
+            } else {
+                // They cancel out.
+                out.copy_from_slice(r);
+            }
         }
     }
 
@@ -125,10 +136,45 @@ impl PoseSpace for SkeletonSpace {
         }
         for joint in 0..self.skeleton.len() {
             let v = &difference[3 + 3 * joint..6 + 3 * joint];
+            if v == [0.0; 3] {
+                continue;
+            }
             let turn = UnitQuaternion::from_scaled_axis(scale * Vector3::new(v[0], v[1], v[2]));
             let mut turned = Skeleton::rotation(pose, joint) * turn;
             turned.renormalize();
             Skeleton::set_rotation(pose, joint, &turned);
+        }
+    }
+
+    /// Without logarithms where the whole way or its opposite is added, as layers do.
+    fn add_way(
+        &self,
+        pose: &mut [f64],
+        from: &[f64],
+        to: &[f64],
+        scale: f64,
+        difference: &mut [f64],
+    ) {
+        if scale.abs() != 1.0 {
+            self.diff(from, to, difference);
+            self.add(pose, difference, scale);
+            return;
+        }
+        for i in 0..3 {
+            pose[i] += scale * (to[i] - from[i]);
+        }
+        let quaternion = |q: &[f64]| Quaternion::new(q[3], q[0], q[1], q[2]);
+        let joints = pose[3..].chunks_exact_mut(4);
+        let ways = from[3..].chunks_exact(4).zip(to[3..].chunks_exact(4));
+        for (out, (from, to)) in joints.zip(ways) {
+            let way = quaternion(from).conjugate() * quaternion(to);
+            let way = if scale > 0.0 { way } else { way.conjugate() };
+            let turned = quaternion(out) * way;
+            // Splines leave quaternions a little off length one.
+            let length = 1.0 / turned.norm().max(1e-9);
+            for (out, v) in out.iter_mut().zip(turned.coords.iter()) {
+                *out = length * v;
+            }
         }
     }
 
@@ -138,15 +184,5 @@ impl PoseSpace for SkeletonSpace {
             let at = self.skeleton.position(pose, joint);
             out[3 * joint..3 * joint + 3].copy_from_slice(at.coords.as_slice());
         }
-    }
-}
-
-/// Brings a sum of quaternions to length one; `fallback` where they cancel out.
-fn normalise(q: &mut [f64], fallback: &[f64]) {
-    let norm = Quaternion::new(q[3], q[0], q[1], q[2]).norm();
-    if norm > 1e-9 {
-        q.iter_mut().for_each(|v| *v /= norm);
-    } else {
-        q.copy_from_slice(fallback);
     }
 }

@@ -5,11 +5,13 @@
 
 pub mod address;
 pub mod dynamixel;
+mod no_servos;
 pub mod port;
 pub mod serial;
 
 use crate::base::JointState;
 pub use address::{AddressError, BusAddress, DynamixelBackend};
+pub use no_servos::NoServos;
 pub use port::{Port, PortError};
 pub use serial::SerialPort;
 

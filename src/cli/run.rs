@@ -9,6 +9,7 @@ use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files, GestureFiles};
 use crate::gesture::PerformerScale;
 use crate::live::control::Ending;
+use crate::live::footing::{Footing, Slides};
 use crate::live::reload::News;
 use crate::live::session::{self, Observer, Report, Session};
 use crate::live::source::{self, Source};
@@ -50,6 +51,7 @@ pub const EXAMPLES: &str = "Examples:
   my_tracker | handwave run my_robot.toml --input -   live from a pipe (JSON Lines or CSV)
   handwave run --scale 1.5                            a small hand (its poses enlarged to the gestures' size)
   handwave run --headless --speed max --targets a.csv the whole performance at once, same bytes every time
+  handwave run configs/fox.toml --headless --speed max --targets fox.csv   an avatar: rotations, no servos
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
 Ctrl-C once: the robot comes to rest, lies down, torque goes off. Twice: torque goes off at once.
@@ -117,6 +119,16 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         }
     }
     .map_err(Failure::input)?;
+    if let (Some(avatar), true) = (
+        &character.body.avatar,
+        options.bus.is_some() || !options.fault.is_empty(),
+    ) {
+        return Err(Failure::input(format!(
+            "--bus and --fault are for servos; {} is an avatar of {} joints and has none: leave them out",
+            character.name,
+            avatar.skeleton.len()
+        )));
+    }
     if let Some(bus) = &options.bus {
         character.bus = bus
             .parse()
@@ -170,7 +182,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         .targets
         .as_ref()
         .map(|path| {
-            TargetsFile::create(path, &character.joints)
+            TargetsFile::create(path, &character)
                 .map_err(|e| Failure::input(format!("--targets {}: {e}", path.display())))
         })
         .transpose()?;
@@ -181,6 +193,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         targets,
         display: Display::Quiet,
         newest: CycleRecord::default(),
+        footing: character.body.feet.clone().map(Footing::new),
         later: Vec::new(),
     };
     let report = match options.speed {
@@ -213,7 +226,8 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         warn(format_args!("{line}"));
     }
     let written = onlooker.targets.map_or(Ok(()), TargetsFile::finish);
-    conclude(options, report, written, &character)
+    let slides = onlooker.footing.map(|f| f.slides());
+    conclude(options, report, slides, written, &character)
 }
 
 fn faults(options: &RunOptions, character: &Character) -> Result<Vec<FaultSpec>, Failure> {
@@ -301,15 +315,19 @@ fn session(
 fn conclude(
     options: &RunOptions,
     report: Report,
+    slides: Option<Slides>,
     written: Result<(), String>,
     character: &Character,
 ) -> Result<ExitStatus, Failure> {
     if options.json {
-        say(format_args!("{}", summary::to_json(&report, character)));
+        say(format_args!(
+            "{}",
+            summary::to_json(&report, slides, character)
+        ));
     } else {
         say(format_args!(
             "{}",
-            summary::to_text(&report, character).trim_end()
+            summary::to_text(&report, slides, character).trim_end()
         ));
     }
     let end = |status, message: String| Failure { status, message };
@@ -356,6 +374,7 @@ struct Onlooker {
     targets: Option<TargetsFile>,
     display: Display,
     newest: CycleRecord,
+    footing: Option<Footing>,
     /// What could not be said while the view had the terminal.
     later: Vec<String>,
 }
@@ -364,6 +383,9 @@ impl Observer for Onlooker {
     fn cycle(&mut self, record: &CycleRecord) {
         if let Some(targets) = &mut self.targets {
             targets.row(record);
+        }
+        if let Some(footing) = &mut self.footing {
+            footing.see(record);
         }
         self.newest.clone_from(record);
         self.display.count(record);

@@ -3,12 +3,13 @@
 use crate::config::Character;
 use crate::gesture::TrackingCounts;
 use crate::live::control::Ending;
+use crate::live::footing::Slides;
 use crate::live::session::Report;
 use crate::live::stats::{FaultKind, Percentiles, ServoFault};
 use serde_json::{Value, json};
 
 /// The summary as one JSON object.
-pub fn to_json(report: &Report, character: &Character) -> Value {
+pub fn to_json(report: &Report, slides: Option<Slides>, character: &Character) -> Value {
     let stats = &report.stats;
     let torque = report.torque.as_ref().and_then(|t| t.as_ref().ok());
     let faults: Vec<Value> = stats
@@ -26,9 +27,14 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
         .collect();
     json!({
         "ending": ending_word(&report.ending),
+        "avatar": character.body.avatar.is_some(),
         "cycles": stats.cycles, "overruns": stats.overruns, "missed_cycles": stats.missed,
         "envelope_cycles": stats.held_back,
         "transitions": report.transitions.completed, "transitions_aborted": report.transitions.aborted,
+        "transitions_interrupted": report.transitions.interrupted, "transitions_refused": report.transitions.refused,
+        "stances": slides.map(|s| s.stances),
+        "foot_slide_mm": slides.map(|s| 1e3 * s.targets_m),
+        "foot_slide_measured_mm": slides.map(|s| 1e3 * s.measured_m),
         "samples": stats.samples, "samples_dropped": dropped, "samples_refused": report.refused,
         "points_rejected": report.tracking.outliers, "points_filled": report.tracking.filled,
         "sides_swapped": report.tracking.swapped, "performer_scale": report.performer_scale,
@@ -46,7 +52,7 @@ pub fn to_json(report: &Report, character: &Character) -> Value {
 }
 
 /// The summary as text.
-pub fn to_text(report: &Report, character: &Character) -> String {
+pub fn to_text(report: &Report, slides: Option<Slides>, character: &Character) -> String {
     let stats = &report.stats;
     let line = |p: Percentiles| format!("p50 {} us, p99 {} us, max {} us", p.p50, p.p99, p.max);
     if stats.cycles == 0 {
@@ -62,7 +68,7 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         "{}: {}\n\
          cycles        {}, overruns {} ({:.2} %), bus late {} ({:.2} %)\n\
          envelope      acted in {} cycles\n\
-         transitions   {} done, {} aborted\n\
+         transitions   {}\n{}\
          poses         {} used, {} dropped{}\n\
          bus           {} replies missing, damage {} (stray bytes, wrong checksums), {:.1} MB\n\
          pose to wire  {}\n\
@@ -77,8 +83,8 @@ pub fn to_text(report: &Report, character: &Character) -> String {
         stats.missed,
         share(stats.missed),
         stats.held_back,
-        report.transitions.completed,
-        report.transitions.aborted,
+        transitions(report),
+        standing(slides),
         stats.samples,
         report.dropped.total() + report.before_header + report.refused,
         reasons(report),
@@ -127,6 +133,9 @@ fn tracking_lines(report: &Report) -> String {
 }
 
 fn torque_lines(report: &Report, character: &Character) -> String {
+    if character.body.avatar.is_some() {
+        return "servos        none: an avatar\n".into();
+    }
     let torque = match &report.torque {
         None => return "torque        stays on, as safety.on_exit says\n".into(),
         Some(Err(error)) => return format!("torque        UNKNOWN, not read back: {error}\n"),
@@ -146,6 +155,9 @@ fn torque_lines(report: &Report, character: &Character) -> String {
 /// One line per servo and kind of fault, with the first few times; faults that struck all servos at
 /// once are those of the line, not of a servo, and get one line together.
 fn fault_lines(report: &Report, character: &Character) -> String {
+    if character.servos.is_empty() {
+        return String::new();
+    }
     let stats = &report.stats;
     let at_once = |fault: &ServoFault| {
         let same = |f: &&ServoFault| f.kind == fault.kind && f.from_s == fault.from_s;
@@ -220,4 +232,31 @@ fn ending_word(ending: &Ending) -> &'static str {
         Ending::SafetyStop(_) => "safety stop",
         Ending::Bus(_) => "bus failure",
     }
+}
+
+/// Transitions in words; what did not happen is not told.
+fn transitions(report: &Report) -> String {
+    let counts = &report.transitions;
+    let mut text = format!("{} done, {} aborted", counts.completed, counts.aborted);
+    for (count, word) in [
+        (counts.interrupted, "interrupted"),
+        (counts.refused, "refused: nothing similar"),
+    ] {
+        if count > 0 {
+            text.push_str(&format!(", {count} {word}"));
+        }
+    }
+    text
+}
+
+/// How well feet stood; nothing for a body without feet that are pinned.
+fn standing(slides: Option<Slides>) -> String {
+    slides.map_or(String::new(), |s| {
+        format!(
+            "feet          slid at most {:.2} mm in {} stances (servos, measured: {:.1} mm)\n",
+            1e3 * s.targets_m,
+            s.stances,
+            1e3 * s.measured_m
+        )
+    })
 }

@@ -9,7 +9,8 @@ use super::files::Files;
 use super::gestures::{GestureFiles, Reader, merged};
 use super::layer::{LayerParts, layer_parts};
 use super::motion::{GraphParts, clip, graph_parts, neighbourhoods, read};
-use super::servos::servo_map;
+use super::parts::{Parts, parts};
+use super::search::{SearchParts, search_parts};
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{
@@ -21,10 +22,10 @@ use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::gait_frames::outside_limits;
 use crate::motion::graph::Graph;
 use crate::motion::mapping::DirectClass;
+use crate::motion::node::ClassInput;
 use crate::motion::node::Node;
 use crate::motion::range::JointRange;
 use crate::pose::PoseHeader;
-use crate::puppet::ClassInput;
 use crate::robot::{Envelope, JointEnvelope, RobotModel};
 
 /// A checked character: everything but the pose stream and the bus.
@@ -38,11 +39,11 @@ pub struct Character {
     pub files: Files,
     /// Pose source as written, such as `file:performances/x.csv`.
     pub source: String,
-    /// The robot.
-    pub model: RobotModel,
+    /// The robot; `None` for an avatar.
+    pub model: Option<RobotModel>,
     /// Its poses and feet.
     pub body: Body,
-    /// Joint names in model order.
+    /// What is driven, in model order: joints of a robot, coordinates of an avatar (`hips.qx`).
     pub joints: Vec<String>,
     /// Servos in model order.
     pub servos: Vec<ServoSpec>,
@@ -71,6 +72,7 @@ pub struct Character {
     /// Pictures per second of the terminal view.
     pub view_hz: f64,
     graph: GraphParts,
+    search: Option<SearchParts>,
     layers: Vec<LayerParts>,
     channels: Vec<ChannelParts>,
     /// Paths of the gesture files, and what stood in them.
@@ -109,13 +111,15 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let file: CharacterFile = toml::from_str(&text).map_err(|e| at.toml(&e))?;
     check_numbers(&file, &at)?;
 
-    let model = RobotModel::from_urdf(&read(&files, &file.robot.urdf, "robot.urdf", &at)?)
-        .map_err(|e| at.at(file.robot.urdf.span(), "robot.urdf", e))?;
-    let joints = model.joint_names();
-    let body = Body::new(&model, &file.robot, &at)?;
-    let limits = envelope_limits(&file, &model);
-    let servos = servo_map(&file, &model, &at)?;
-    let ranges = joint_ranges(&limits);
+    let Parts {
+        model,
+        body,
+        joints,
+        limits,
+        servos,
+        wire,
+    } = parts(&files, &file, &at)?;
+    let ranges = joint_ranges(&body, &limits);
     let (mut gestures, paths, texts) = gesture_set(&files, &file, &at)?;
     let classes = class_parts(&files, &file, &body, &joints, &limits, &gestures, &at)?;
     if let (true, Some(map)) = (
@@ -129,7 +133,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     }
     for class in classes.iter().filter(|c| c.map.is_none()) {
         for example in &class.examples {
-            if let Some(problem) = outside_limits(&example.clip, &model).first() {
+            if let Some(problem) = outside(&example.clip, model.as_ref()) {
                 return Err(at.key(
                     "class.clip",
                     format!("clip {}: {problem}", example.clip.name),
@@ -145,6 +149,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         .map_err(|e| at.key("class.name", e))?;
     }
     let graph = graph_parts(&file, &classes, &at)?;
+    let search = search_parts(&file, &classes, &at)?;
     let layers = file
         .layer
         .iter()
@@ -153,7 +158,14 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let channels = channel_parts(&file, &at)?;
     let end_pose = match &file.safety.end_clip {
         Some(path) => {
-            let clip = clip(&files, path, "safety.end_clip", &body, &at)?;
+            let clip = clip(
+                &files,
+                path,
+                "safety.end_clip",
+                &body,
+                Some(ClipKind::Path),
+                &at,
+            )?;
             if clip.kind != ClipKind::Path {
                 let problem = format!(
                     "clip {} is a cycle; the end pose is the end of a path",
@@ -161,7 +173,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
                 );
                 return Err(at.at(path.span(), "safety.end_clip", problem));
             }
-            if let Some(problem) = outside_limits(&clip, &model).first() {
+            if let Some(problem) = outside(&clip, model.as_ref()) {
                 let problem = format!("clip {}: {problem}", clip.name);
                 return Err(at.at(path.span(), "safety.end_clip", problem));
             }
@@ -186,7 +198,6 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         })?,
         None => EstimatorKind::default(),
     };
-    let bus = file.bus.bus.parse().map_err(|e| at.key("bus.bus", e))?;
     let safety = &file.safety;
     let front_options = FrontEndOptions {
         estimator,
@@ -211,10 +222,10 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
             on_servo_fault: safety.on_servo_fault,
             on_exit: safety.on_exit,
         },
-        bus,
-        sim_baud: file.bus.baud,
-        rate_hz: file.bus.rate_hz,
-        watchdog_ms: file.bus.watchdog_ms,
+        bus: wire.bus,
+        sim_baud: wire.baud,
+        rate_hz: wire.rate_hz,
+        watchdog_ms: wire.watchdog_ms,
         view_hz: file.view.refresh_hz,
         files,
         model,
@@ -226,6 +237,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         classes,
         end_pose,
         graph,
+        search,
         layers,
         channels,
     };
@@ -243,7 +255,7 @@ impl Character {
 
     /// The animator, with layers bound to the channels of `front`.
     pub fn animator(&self, front: &FrontEnd) -> Result<Animator, ConfigError> {
-        let ranges = joint_ranges(&self.limits);
+        let ranges = joint_ranges(&self.body, &self.limits);
         let wrong = |key: &str, line: Option<usize>, problem: String| ConfigError {
             file: self.config_name.clone(),
             line,
@@ -272,10 +284,16 @@ impl Character {
         let (start, edges, options) = &self.graph;
         let edges: Vec<_> = edges.iter().map(|(from, to)| (*from, *to, 1.0)).collect();
         let graph = Graph::new(classes.len(), *start, &edges, *options);
-        let space = Box::new(self.body.space.clone());
-        let animator = Animator::new(space, classes, graph, layers, &ranges);
-        Ok(match &self.body.feet {
-            Some(feet) => animator.with_pinned_feet(Box::new(feet.clone())),
+        let space = self.body.space.boxed();
+        let mut animator = Animator::new(space, classes, graph, layers, &ranges);
+        if let (Some(search), Some(model)) = (&self.search, &self.model) {
+            let made = search.make(&self.classes, &self.graph.1, model);
+            for (from, to, search) in made.map_err(|e| wrong("graph.search", None, e))? {
+                animator = animator.with_search(from, to, search);
+            }
+        }
+        Ok(match self.body.pinned() {
+            Some(feet) => animator.with_pinned_feet(feet),
             None => animator,
         })
     }
@@ -287,6 +305,29 @@ impl Character {
         (self.classes.iter())
             .map(|class| class.input(front, &mut features, &self.config_name))
             .collect()
+    }
+
+    /// The robot, for what works on robots alone.
+    pub fn robot(&self) -> Result<&RobotModel, ConfigError> {
+        self.model.as_ref().ok_or_else(|| ConfigError {
+            file: self.config_name.clone(),
+            line: None,
+            key: "avatar".into(),
+            problem: "this needs a robot with joints and limits; the character is an avatar".into(),
+        })
+    }
+
+    /// Where an avatar stands before a run: as with nothing performed.
+    pub fn standing(&self) -> Vec<f64> {
+        let mut pose = vec![0.0; self.body.space.get().len()];
+        self.body.space.get().rest(&mut pose);
+        let (start, ..) = &self.graph;
+        let examples = self.classes.get(*start).map_or(&[][..], |c| &c.examples);
+        let still = examples.iter().find(|e| e.parameters[0] == 0.0);
+        if let Some(example) = still.or(examples.first()) {
+            example.clip.pose(0.0, &mut pose);
+        }
+        pose
     }
 
     /// Features of the pose maps, one per class that has one, in node order.
@@ -366,7 +407,11 @@ fn performer_scale(file: &CharacterFile, at: &Pointer<'_>) -> Result<PerformerSc
         .map_err(|problem: String| at.at(value.span(), "input.scale", problem))
 }
 
-fn joint_ranges(limits: &[JointEnvelope]) -> Vec<JointRange> {
+/// What each joint may do; nothing is asked of an avatar's.
+fn joint_ranges(body: &Body, limits: &[JointEnvelope]) -> Vec<JointRange> {
+    if body.avatar.is_some() {
+        return Vec::new();
+    }
     limits
         .iter()
         .map(|l| JointRange {
@@ -379,25 +424,28 @@ fn joint_ranges(limits: &[JointEnvelope]) -> Vec<JointRange> {
 fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<(), ConfigError> {
     let s = &file.safety;
     let g = &file.graph;
+    let (robot, bus, avatar) = (file.robot.as_ref(), file.bus.as_ref(), file.avatar.as_ref());
     let checks = [
         ("input.window", file.input.window, 0.1, 2.0),
         (
             "robot.acceleration_rad_s2",
-            Some(file.robot.acceleration_rad_s2),
+            robot.map(|r| r.acceleration_rad_s2),
             1.0,
             1e5,
         ),
         (
             "robot.velocity_share",
-            Some(file.robot.velocity_share),
+            robot.map(|r| r.velocity_share),
             0.01,
             1.0,
         ),
-        ("bus.rate_hz", Some(file.bus.rate_hz), 10.0, 2000.0),
-        ("bus.baud", Some(f64::from(file.bus.baud)), 9600.0, 4.5e6),
+        ("bus.rate_hz", bus.map(|b| b.rate_hz), 10.0, 2000.0),
+        ("bus.baud", bus.map(|b| f64::from(b.baud)), 9600.0, 4.5e6),
+        ("avatar.rate_hz", avatar.map(|a| a.rate_hz), 10.0, 2000.0),
+        ("avatar.unit_m", avatar.and_then(|a| a.unit_m), 1e-6, 1e3),
         (
             "bus.watchdog_ms",
-            Some(f64::from(file.bus.watchdog_ms)),
+            bus.map(|b| f64::from(b.watchdog_ms)),
             0.0,
             2540.0,
         ),
@@ -428,17 +476,9 @@ fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<(), ConfigErr
     Ok(())
 }
 
-fn envelope_limits(file: &CharacterFile, model: &RobotModel) -> Vec<JointEnvelope> {
-    model
-        .limits()
-        .iter()
-        .map(|l| JointEnvelope {
-            lower: l.lower,
-            upper: l.upper,
-            velocity: l.velocity * file.robot.velocity_share,
-            acceleration: file.robot.acceleration_rad_s2,
-        })
-        .collect()
+/// Where a clip leaves a robot's limits.
+fn outside(clip: &Clip, model: Option<&RobotModel>) -> Option<String> {
+    outside_limits(clip, model?).into_iter().next()
 }
 
 /// All gesture files as one set, with their paths and texts.

@@ -12,8 +12,8 @@ use crate::gesture::{FrontEnd, GestureKind, GestureSet};
 use crate::motion::class::{ClassOptions, EXTRA, Example, Play};
 use crate::motion::clip::ClipKind;
 use crate::motion::layer::ChannelMap;
+use crate::motion::node::ClassInput;
 use crate::motion::weights::{Parameters, WeightKind};
-use crate::puppet::ClassInput;
 use crate::robot::JointEnvelope;
 
 /// A class before it is built.
@@ -49,6 +49,30 @@ impl ClassParts {
     /// Example clips with their parameters; none for a pose map.
     pub fn examples(&self) -> &[Example] {
         &self.examples
+    }
+
+    /// What drives the class, in words.
+    pub fn driven_by(&self, gestures: &GestureSet) -> String {
+        let by = match (
+            self.gesture.and_then(|g| gestures.gestures.get(g)),
+            &self.channel,
+        ) {
+            (Some(gesture), _) => {
+                let sense = if self.reverse {
+                    ", in the opposite sense"
+                } else {
+                    ""
+                };
+                format!("gesture {} ({}{sense})", gesture.name, gesture.kind.name())
+            }
+            (None, Some(channel)) => format!("channel {}", channel.channel),
+            (None, None) => "no gesture: played while nothing is performed".into(),
+        };
+        match self.options.play {
+            Play::Gesture => by,
+            Play::Once => format!("{by}; played once by the clock"),
+            Play::Loop => format!("{by}; round and round by the clock"),
+        }
     }
 
     /// Names of the example clips, in the order of the class's weights.
@@ -114,6 +138,10 @@ pub(super) fn class_parts(
         let gesture = (class.gesture.as_ref())
             .map(|entry| gesture_named(entry, "class.gesture", gestures, at))
             .transpose()?;
+        if let (Some(path), Some(_)) = (&class.map, &body.avatar) {
+            let problem = "a pose map drives a robot; a class of an avatar has clips";
+            return Err(at.at(path.span(), "class.map", problem));
+        }
         if let Some(path) = &class.map {
             parts.push(direct_parts(
                 files, file, class, path, joints, limits, gesture, at,
@@ -131,6 +159,15 @@ pub(super) fn class_parts(
             ));
         }
         let (extra, names) = extra_parts(class, at)?;
+        let kind = match (gesture, play) {
+            (_, Play::Loop) => Some(ClipKind::Cycle),
+            (_, Play::Once) => Some(ClipKind::Path),
+            (Some(gesture), Play::Gesture) => Some(match gestures.gestures[gesture].kind {
+                GestureKind::Cyclic => ClipKind::Cycle,
+                GestureKind::NonCyclic => ClipKind::Path,
+            }),
+            (None, Play::Gesture) => None,
+        };
         let mut examples = Vec::new();
         for entry in &class.clip {
             let in_range = (0.0..=10.0).contains(&entry.amplitude)
@@ -145,7 +182,7 @@ pub(super) fn class_parts(
                     ),
                 ));
             }
-            let clip = clip(files, &entry.file, "class.clip.file", body, at)?;
+            let clip = clip(files, &entry.file, "class.clip.file", body, kind, at)?;
             if clip.kind == ClipKind::Cycle && entry.amplitude > 0.0 && entry.frequency_hz <= 0.0 {
                 return Err(at.at(
                     entry.file.span(),

@@ -27,10 +27,12 @@ pub struct CharacterFile {
     /// Edges and thresholds.
     #[serde(default)]
     pub graph: GraphEntry,
-    /// The robot.
-    pub robot: RobotEntry,
+    /// The robot; it needs a bus.
+    pub robot: Option<RobotEntry>,
     /// The bus.
-    pub bus: BusEntry,
+    pub bus: Option<BusEntry>,
+    /// Instead of robot and bus: an avatar.
+    pub avatar: Option<AvatarEntry>,
     /// Ramps, safe states, what to do when something is lost.
     #[serde(default)]
     pub safety: SafetyEntry,
@@ -235,6 +237,28 @@ pub struct GraphEntry {
     pub blend_s: Option<f64>,
     /// Idle time before the start class comes back, seconds.
     pub idle_s: Option<f64>,
+    /// Transitions between classes of clips are chosen at run time, by likeness and latency, in place of a blend.
+    pub search: Option<SearchEntry>,
+}
+
+/// How transitions are chosen.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchEntry {
+    /// Steps that are looked ahead (10).
+    pub depth: Option<usize>,
+    /// Length of a step, as a part of a cycle or path, and of a parameter's range (0.1).
+    pub step: Option<f64>,
+    /// Cost of a frame of latency, at 25 frames a second (5).
+    pub lambda: Option<f64>,
+    /// Cost of a dissimilarity of 1; found from random requests when not given.
+    pub kappa: Option<f64>,
+    /// Least similarity of a transition, 0..1 (0): without one the class is not left.
+    pub s_min: Option<f64>,
+    /// Longest way to a transition, seconds (1).
+    pub latency_s: Option<f64>,
+    /// Edges that it is for, as `["from", "to"]`; all that it can be for when not given.
+    pub edges: Option<Vec<Spanned<[String; 2]>>>,
 }
 
 /// The robot.
@@ -256,6 +280,38 @@ pub struct RobotEntry {
     pub pin_feet: bool,
     /// Joint to servo.
     pub joint: Vec<JointEntry>,
+}
+
+/// An avatar: a skeleton that is played without servos. Commented in `configs/fox.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AvatarEntry {
+    /// Path of a file with the skeleton: glTF, BVH, AMC.
+    pub model: Spanned<String>,
+    /// Metres per unit of length of the model and of its clips; as the format says when not given.
+    pub unit_m: Option<f64>,
+    /// Control cycles per second.
+    #[serde(default = "control_rate")]
+    pub rate_hz: f64,
+    /// Limbs that stand on the ground.
+    #[serde(default)]
+    pub limb: Vec<LimbEntry>,
+    /// Feet that stand on the ground stay where they are, by turning the limb's joints; quick motion jerks.
+    #[serde(default)]
+    pub pin_feet: bool,
+}
+
+/// A limb of an avatar.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimbEntry {
+    /// Limb name.
+    pub name: String,
+    /// The joint that touches the ground.
+    pub end: Spanned<String>,
+    /// How many joints above it the limb has.
+    #[serde(default = "two_joints")]
+    pub joints: usize,
 }
 
 /// One joint and its servo.
@@ -402,6 +458,9 @@ fn one() -> f64 {
 }
 fn yes() -> bool {
     true
+}
+fn two_joints() -> usize {
+    2
 }
 fn two() -> f64 {
     2.0

@@ -8,7 +8,7 @@ use super::files::Files;
 use super::motion::clip;
 use crate::base::suggest::hint;
 use crate::gesture::{FrontEnd, GestureSet};
-use crate::motion::clip::Clip;
+use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::layer::{ChannelMap, Layer, LayerDrive, LayerOptions};
 use crate::motion::range::JointRange;
 
@@ -95,6 +95,12 @@ pub(super) fn layer_parts(
             ));
         }
     };
+    // Between two values of a channel lies a way; the clock goes round.
+    let kind = match &source {
+        Source::Channel(..) => Some(ClipKind::Path),
+        Source::Clock => Some(ClipKind::Cycle),
+        Source::Gesture(_) => None,
+    };
     if let Some(hz) = entry.frequency_hz
         && !(hz > 0.0 && hz <= 50.0)
     {
@@ -107,7 +113,7 @@ pub(super) fn layer_parts(
     Ok(LayerParts {
         name: entry.name.get_ref().clone(),
         source,
-        clip: clip(files, &entry.clip, "layer.clip", body, at)?,
+        clip: clip(files, &entry.clip, "layer.clip", body, kind, at)?,
         joints: entry.joints.clone(),
         frequency_hz: entry.frequency_hz,
         idle_only: entry.idle_only,
@@ -145,8 +151,14 @@ impl LayerParts {
             frequency_hz: self.frequency_hz,
             idle_only: self.idle_only,
         };
-        Layer::new(&self.name, &options, self.clip.clone(), &body.space, ranges)
-            .map_err(|e| wrong("layer", e.to_string()))
+        Layer::new(
+            &self.name,
+            &options,
+            self.clip.clone(),
+            body.space.get(),
+            ranges,
+        )
+        .map_err(|e| wrong("layer", e.to_string()))
     }
 }
 

@@ -3,6 +3,7 @@
 //! [`mod@file`] is what a user writes, [`files`] where its parts are read from (a folder, or those
 //! embedded in the program), [`build`] checks it and makes the parts, [`map`] learns the pose maps it names, [`error`] tells what is wrong.
 
+mod avatar;
 pub mod body;
 pub mod build;
 mod channel;
@@ -14,9 +15,12 @@ mod gestures;
 mod layer;
 pub mod map;
 mod motion;
+mod parts;
+mod search;
 mod servos;
 pub mod starter;
 
+pub use avatar::Avatar;
 pub use build::{Character, load};
 pub use error::ConfigError;
 pub use files::Files;

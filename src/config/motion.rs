@@ -6,7 +6,7 @@ use super::error::{ConfigError, Pointer};
 use super::file::CharacterFile;
 use super::files::Files;
 use crate::base::suggest::hint;
-use crate::motion::clip::{Clip, ClipFile};
+use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::graph::GraphOptions;
 use std::ops::Range;
 
@@ -28,18 +28,11 @@ pub(super) fn clip(
     path: &toml::Spanned<String>,
     key: &str,
     body: &Body,
+    kind: Option<ClipKind>,
     at: &Pointer<'_>,
 ) -> Result<Clip, ConfigError> {
-    let text = read(files, path, key, at)?;
-    ClipFile::from_json(&text)
-        .and_then(|f| body.clip(&f))
-        .map_err(|e| {
-            at.at(
-                path.span(),
-                key,
-                format!("{}: {e}", files.name(path.get_ref())),
-            )
-        })
+    body.named_clip(files, path.get_ref(), kind)
+        .map_err(|problem| at.at(path.span(), key, problem))
 }
 
 /// Start node, edges, options.

@@ -1,19 +1,20 @@
 //! The joint map: which servo moves which joint, checked against the URDF's limits.
 
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, JointEntry};
+use super::file::{BusEntry, JointEntry, RobotEntry};
 use crate::base::suggest::hint;
 use crate::bus::dynamixel::{Direction, Model, ServoSpec};
 use crate::robot::RobotModel;
 
 /// Servos in model order; every moving joint has exactly one.
 pub(super) fn servo_map(
-    file: &CharacterFile,
+    robot: &RobotEntry,
+    bus: &BusEntry,
     model: &RobotModel,
     at: &Pointer<'_>,
 ) -> Result<Vec<ServoSpec>, ConfigError> {
     let joints = model.joint_names();
-    let servo_model = Model::by_name(file.bus.model.get_ref()).ok_or_else(|| {
+    let servo_model = Model::by_name(bus.model.get_ref()).ok_or_else(|| {
         let names: Vec<&str> = crate::bus::dynamixel::model::MODELS
             .iter()
             .map(|m| m.name)
@@ -22,13 +23,13 @@ pub(super) fn servo_map(
             "bus.model",
             format!(
                 "unknown servo model {:?}. Allowed: {}",
-                file.bus.model.get_ref(),
+                bus.model.get_ref(),
                 names.join(", ")
             ),
         )
     })?;
     let mut by_joint: Vec<Option<&JointEntry>> = vec![None; joints.len()];
-    for entry in &file.robot.joint {
+    for entry in &robot.joint {
         let name = entry.name.get_ref();
         let Some(joint) = joints.iter().position(|j| j == name) else {
             let hint = hint(name, joints.iter().map(String::as_str));
@@ -37,7 +38,7 @@ pub(super) fn servo_map(
                 "robot.joint.name",
                 format!(
                     "{name:?} is not a moving joint of {}{hint} Joints: {}",
-                    file.robot.urdf.get_ref(),
+                    robot.urdf.get_ref(),
                     joints.join(", ")
                 ),
             ));

@@ -8,6 +8,7 @@ pub mod arrival;
 pub mod clock;
 pub mod control;
 pub mod feed;
+pub mod footing;
 pub mod keys;
 pub mod realtime;
 pub mod record;

@@ -34,6 +34,10 @@ pub struct CycleRecord {
     pub transition: Option<(Transition, f64)>,
     /// Travelled way.
     pub root: RootPose,
+    /// The body over the ground, of a robot that walks: forward, left, height (m), roll, pitch, yaw (rad).
+    pub body: Vec<f64>,
+    /// Feet that the motion has on the ground, one bit each.
+    pub grounded: u64,
     /// Joints held back by the envelope.
     pub held_back: usize,
     /// Age of the last pose, seconds.
@@ -87,6 +91,14 @@ impl CycleRecord {
         self.active = animator.active();
         self.transition = animator.transition();
         self.root = animator.root();
+        let pins = animator.pins();
+        self.grounded = pins.map_or(0, |pins| pins.grounded());
+        let beyond = if pins.is_some() {
+            targets.positions.len()
+        } else {
+            puppet.pose().len()
+        };
+        refill(&mut self.body, puppet.pose()[beyond..].iter().copied());
     }
 }
 

@@ -5,7 +5,7 @@ use crate::bus::dynamixel::model::STATE_BYTES;
 use crate::bus::dynamixel::{
     self, ChainOptions, Client, DynamixelChain, Master, MasterOptions, SpecError,
 };
-use crate::bus::{BusAddress, PortError, ServoBus};
+use crate::bus::{BusAddress, NoServos, PortError, ServoBus};
 use crate::config::Character;
 use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
 use handwave_dynamixel::baud::RateList;
@@ -59,6 +59,13 @@ pub fn open(
     clock: Arc<dyn Clock>,
     rate_hz: f64,
 ) -> Result<Wire, WireError> {
+    if character.body.avatar.is_some() {
+        let bus = NoServos::new(character.joints.clone(), character.standing());
+        return Ok(Wire {
+            bus: Box::new(bus),
+            line: None,
+        });
+    }
     let options = ChainOptions {
         bus: match address {
             BusAddress::Sim => "sim".into(),
@@ -106,6 +113,9 @@ fn simulated_line(character: &Character) -> Result<SharedLine, WireError> {
 ///
 /// The least a cycle takes is a sync write of goals and a fast sync read of states, byte times alone.
 pub fn too_slow(character: &Character, address: &BusAddress, rate_hz: f64) -> Option<String> {
+    if character.servos.is_empty() {
+        return None;
+    }
     let baud = match address {
         BusAddress::Sim => character.sim_baud,
         BusAddress::Dynamixel { baud, .. } => *baud,

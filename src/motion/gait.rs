@@ -27,6 +27,7 @@
 //! ```toml
 //! version = 1
 //! name = "bow"
+//! # duration_s = 2.0       # how long it takes where the clock plays it (play = "once")
 //! [[pose]]
 //! body_height_m = 0.15
 //! [[pose]]
@@ -114,6 +115,9 @@ pub struct GaitDescription {
     /// It goes up and down, m, twice per cycle.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub bob_m: f64,
+    /// How long a path takes when the clock plays it, s.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub duration_s: f64,
     /// Touch-down phase per leg, fraction of the cycle.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub phase: BTreeMap<String, f64>,
@@ -199,6 +203,7 @@ impl GaitDescription {
             body_height_m: None,
             left_m: 0.0,
             turn_rad: 0.0,
+            duration_s: 0.0,
             stance_width_m: 0.0,
             stance_length_m: 0.0,
             sway_m: 0.0,
@@ -258,6 +263,12 @@ impl GaitDescription {
             && !(-5.0..=5.0).contains(&s)
         {
             return bad("stride_m", format!("{s} is not in -5..5 m"));
+        }
+        if !(0.0..=3600.0).contains(&self.duration_s) {
+            return bad(
+                "duration_s",
+                format!("{} is not in 0..3600", self.duration_s),
+            );
         }
         if !(-3.2..=3.2).contains(&self.turn_rad) {
             return bad("turn_rad", format!("{} is not in -3.2..3.2", self.turn_rad));

@@ -152,7 +152,7 @@ impl<'a> Stance<'a> {
             root: RootAdvance::default(),
             segments: Vec::new(),
             frames: Vec::new(),
-            duration_s: 0.0,
+            duration_s: description.duration_s,
             skeleton: None,
             body: Vec::new(),
             way: Vec::new(),

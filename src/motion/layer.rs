@@ -220,6 +220,11 @@ impl Layer {
             return;
         }
         self.clip.pose(at, &mut self.pose);
+        if self.clip.kind == ClipKind::Path && self.mask.iter().all(|moves| *moves) {
+            let (rest, there) = (&self.rest, &self.pose);
+            space.add_way(pose, rest, there, weight.signum(), &mut self.difference);
+            return;
+        }
         // Clips of skeletons come out of their splines a hair off unit length.
         space.blend(&self.pose, &[1.0], &mut self.blended);
         space.diff(&self.rest, &self.blended, &mut self.difference);

@@ -1,8 +1,24 @@
 //! A node of the motion graph: a class of clips, or a pose map that drives the body directly.
 
-use super::class::{Drive, MotionClass, Played};
+use super::class::{Drive, EXTRA, MotionClass, Played};
+use super::layer::ChannelMap;
 use super::mapping::DirectClass;
 use crate::body::PoseSpace;
+
+/// What drives a class.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct ClassInput {
+    /// Index of its gesture in the front end; `None` for a pose map that needs none.
+    pub gesture: Option<usize>,
+    /// The gesture is to be performed in the opposite sense.
+    pub reverse: bool,
+    /// The channel that drives it in place of a gesture, by index in the front end.
+    pub channel: Option<(usize, ChannelMap)>,
+    /// Index of its feature in the front end, for a pose map.
+    pub feature: Option<usize>,
+    /// Channels that drive its parameters beside amplitude and frequency, by index in the front end.
+    pub extra: [Option<(usize, ChannelMap)>; EXTRA],
+}
 
 /// What a node of the graph plays.
 #[derive(Clone, Debug)]

@@ -114,6 +114,13 @@ impl Pins {
         self.pins[foot].on_ground
     }
 
+    /// The feet on the ground, one bit each; those beyond 64 are not told.
+    pub fn grounded(&self) -> u64 {
+        (self.pins.iter().take(64).enumerate())
+            .filter(|(_, pin)| pin.on_ground)
+            .fold(0, |bits, (foot, _)| bits | 1 << foot)
+    }
+
     /// Where each foot is in the world, metres.
     pub fn place(&self, foot: usize) -> Point3<f64> {
         self.pins[foot].at

@@ -127,7 +127,8 @@ impl Spline {
     fn locate(&self, u: f64) -> (usize, usize, f64, f64) {
         match self.ends {
             Ends::Periodic => {
-                let x = u.rem_euclid(1.0) * self.frames as f64;
+                // As rem_euclid, without its division; u just below a whole number may round to one.
+                let x = (u - u.floor()) * self.frames as f64;
                 let a = (x as usize).min(self.frames - 1);
                 (
                     a,

@@ -1,10 +1,11 @@
 //! Robot: URDF model, kinematics, legs, envelope.
 //!
 //! [`model`] reads and checks a URDF, [`kinematics`] places its links, [`leg`] finds legs and
-//! solves them, [`envelope`] is the last thing every target passes before it leaves.
+//! solves them, [`ik`] solves any other chain, [`envelope`] is the last thing every target passes before it leaves.
 
 pub mod adapt;
 pub mod envelope;
+pub mod ik;
 pub mod kinematics;
 pub mod leg;
 mod limits;
@@ -12,5 +13,6 @@ pub mod model;
 pub mod tip;
 
 pub use envelope::{Envelope, JointEnvelope};
+pub use ik::ChainIk;
 pub use leg::{Facing, Leg};
 pub use model::{JointLimits, ModelError, RobotModel};

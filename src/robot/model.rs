@@ -79,6 +79,8 @@ pub struct RobotModel {
     pub(super) meshes: Vec<MeshShape>,
     /// What is odd but not wrong, for the reader.
     pub warnings: Vec<String>,
+    /// Joints from the root outwards.
+    pub(super) order: Vec<super::kinematics::OrderedJoint>,
 }
 
 /// Why a URDF cannot be used.
@@ -207,7 +209,9 @@ impl RobotModel {
         if names.len() != joints.len() {
             return Err(ModelError::NotATree("two joints have the same name".into()));
         }
+        let order = super::kinematics::outwards(&joints, &parent_joint, &actuated);
         Ok(Self {
+            order,
             name: urdf.name,
             links,
             joints,

@@ -14,7 +14,11 @@ use ratatui::widgets::{Block, Paragraph};
 pub fn draw(frame: &mut Frame<'_>, names: &Names, watch: &Watch, record: &CycleRecord) {
     let gestures = names.gestures.len() as u16 + 2;
     let motion = (names.classes.len().max(names.layers.len() + 1)) as u16 + 3;
-    let joints = names.joints.len() as u16 + 2;
+    // An avatar has no servos to show.
+    let joints = match names.joints.len() as u16 {
+        0 => 0,
+        n => n + 2,
+    };
     let [head, top, middle, bottom, foot] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(gestures),

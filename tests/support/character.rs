@@ -74,7 +74,11 @@ impl Player {
         }
         let mut puppet = session::puppet(character, &header, RATE_HZ).expect("a puppet");
         let joints = character.joints.len();
-        puppet.begin(Time::ZERO, &vec![0.0; joints]);
+        let start = match &character.body.avatar {
+            Some(_) => character.standing(),
+            None => vec![0.0; joints],
+        };
+        puppet.begin(Time::ZERO, &start);
         Self {
             puppet,
             samples,

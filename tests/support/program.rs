@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// No run of the program may last longer.
-pub const AT_MOST: Duration = Duration::from_secs(120);
+pub const AT_MOST: Duration = Duration::from_secs(300);
 
 /// A program that has ended.
 #[derive(Debug)]

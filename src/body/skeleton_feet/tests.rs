@@ -1,3 +1,5 @@
+//! Legs of skeletons found, feet placed: on made-up skeletons and random goals.
+
 use super::*;
 use crate::base::random::SplitMix as Random;
 use crate::body::SkeletonJoint;

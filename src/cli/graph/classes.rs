@@ -14,7 +14,7 @@ pub(super) fn classes(
     character: &Character,
     frames: usize,
 ) -> Result<Vec<Option<Arc<SearchClass>>>, Failure> {
-    let levers = lever_arms(&character.model);
+    let levers = lever_arms(character.robot().map_err(Failure::input)?);
     let mut made = Vec::new();
     for parts in &character.classes {
         if parts.map.is_some() {

@@ -72,28 +72,29 @@ fn file_name(class: &str) -> String {
 fn lines(character: &Character, node: usize) -> Vec<String> {
     let class = &character.classes[node];
     let mut lines = Vec::new();
-    match class
-        .gesture
-        .and_then(|g| character.gestures.gestures.get(g))
-    {
-        Some(gesture) => lines.push(format!(
-            "gesture {} ({})",
-            gesture.name,
-            gesture.kind.name()
-        )),
-        None => lines.push("no gesture: played while nothing is performed".into()),
-    }
+    lines.push(class.driven_by(&character.gestures));
     if class.map.is_some() {
         lines.push("pose map: the pose itself drives it".into());
     }
     for example in class.examples() {
         let (amplitude, frequency_hz) = (example.parameters[0], example.parameters[1]);
         let name = &example.clip.name;
-        lines.push(match example.clip.kind {
+        let mut line = match example.clip.kind {
             ClipKind::Path => format!("{name}: a path, progression 0 to 1"),
             ClipKind::Cycle if amplitude == 0.0 => format!("{name}: at rest"),
             ClipKind::Cycle => format!("{name}: amplitude {amplitude}, {frequency_hz} Hz"),
-        });
+        };
+        for (name, value) in class
+            .options
+            .extra
+            .iter()
+            .zip(&example.parameters.as_slice()[2..])
+        {
+            if *value != 0.0 {
+                line.push_str(&format!(", {name} {value}"));
+            }
+        }
+        lines.push(line);
     }
     lines
 }
@@ -119,7 +120,10 @@ fn arrows(character: &Character, edges: &[Edge]) -> Vec<Arrow> {
             Arrow {
                 from: *from,
                 to: *to,
-                label: measured.map_or(String::new(), |e| format!("s {:.2}", e.best.similarity)),
+                // Only what is not as good as equal is worth a word.
+                label: measured
+                    .filter(|e| e.best.similarity < 0.995)
+                    .map_or(String::new(), |e| format!("s {:.2}", e.best.similarity)),
             }
         })
         .collect()

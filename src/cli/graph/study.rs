@@ -136,7 +136,7 @@ fn pair(
         Some(class) => (class.name.clone(), class.examples().to_vec()),
         None => ("pace".to_owned(), pace(character).map_err(bad)?),
     };
-    let levers = lever_arms(&character.model);
+    let levers = lever_arms(character.robot().map_err(Failure::input)?);
     let made = |name: &str, examples: &[Example]| {
         let mut blend = ClipBlend::new(name, examples, &levers)
             .map_err(|e| bad(e.to_string()))?
@@ -180,8 +180,8 @@ fn pace(character: &Character) -> Result<Vec<Example>, String> {
             "no second class whose clips repeat, and no legs to write a gait for ({e}); add such a class and an edge to it"
         )
     };
-    let (legs, facing) =
-        Leg::find_all_facing(&character.model, None).map_err(|e| no_legs(e.to_string()))?;
+    let model = character.robot().map_err(|e| e.to_string())?;
+    let (legs, facing) = Leg::find_all_facing(model, None).map_err(|e| no_legs(e.to_string()))?;
     let ranges: Vec<JointRange> = character
         .limits
         .iter()
@@ -191,7 +191,7 @@ fn pace(character: &Character) -> Result<Vec<Example>, String> {
         })
         .collect();
     let walker = Walker {
-        model: &character.model,
+        model,
         legs: &legs,
         facing,
         ranges: &ranges,
@@ -202,7 +202,7 @@ fn pace(character: &Character) -> Result<Vec<Example>, String> {
             let name = format!("pace_{size}_{tempo}");
             let mut description = GaitDescription::preset(&name, GaitName::Pace);
             description.frequency_hz = Some(frequency_hz);
-            let full = 0.25 * legs.first().map_or(0.3, |l| l.length(&character.model));
+            let full = 0.25 * legs.first().map_or(0.3, |l| l.length(model));
             description.stride_m = Some(share * full);
             description.step_height_m = Some(0.3 * share * full);
             let authored = author(&description, walker, false).map_err(|e| e.to_string())?;

@@ -90,7 +90,7 @@ impl BodyModel {
             });
         }
         let space = Box::new(JointSpace::of_robot(model, floating));
-        let legs = Leg::find_all_facing(model, None);
+        let legs = Leg::find_all(model);
         let note = match &legs {
             Err(e) => Some(e.to_string()),
             Ok(_) if !floating => {
@@ -98,12 +98,12 @@ impl BodyModel {
             }
             Ok(_) => None,
         };
-        let (legs, facing) = legs.unwrap_or_default();
+        let legs = legs.unwrap_or_default();
         let limbs = (legs.iter())
             .map(|l| l.joints.iter().map(|j| known[*j].clone()).collect())
             .collect();
         let feet: Option<Box<dyn Feet>> = (floating && !legs.is_empty())
-            .then(|| Box::new(RobotFeet::new(model.clone(), legs, facing)) as Box<dyn Feet>);
+            .then(|| Box::new(RobotFeet::new(model.clone(), legs)) as Box<dyn Feet>);
         Ok(Self {
             space,
             feet,

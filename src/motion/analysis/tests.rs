@@ -1,3 +1,5 @@
+//! Analysis on motions of which everything is known.
+
 use super::*;
 use crate::body::{RootPose, Skeleton, SkeletonJoint};
 use crate::motion::clip::ClipFile;

@@ -137,7 +137,7 @@ impl ClipFile {
         Ok(file)
     }
 
-    /// JSON text, one line per frame, numbers rounded to a micro-radian and a micrometre.
+    /// JSON text, one line per frame, numbers rounded to a micro-radian.
     pub fn to_json(&self) -> String {
         let round = |v: f64| (v * 1e6).round() / 1e6 + 0.0;
         let rows = |rows: &mut dyn Iterator<Item = &[f64]>| {
@@ -316,5 +316,26 @@ mod tests {
         let mut pose = [0.0; 2];
         clip.pose(1.0, &mut pose);
         assert_eq!(pose, [0.25, 1.0]);
+    }
+
+    #[test]
+    fn a_root_link_that_looks_backwards_does_not_spin_between_frames() {
+        use crate::body::{JointSpace, PoseSpace};
+        let mut file = file((0..5).map(|k| vec![0.1 * f64::from(k), 0.0]).collect());
+        let turn = |k: i32| std::f64::consts::PI + 0.04 * f64::from(k - 2);
+        file.body = (0..5)
+            .map(|k| {
+                let yaw = crate::base::angle::wrap_pi(turn(k));
+                [0.0, 0.0, 0.2, 0.0, 0.0, yaw]
+            })
+            .collect();
+        let space = JointSpace::floating(&["a".into(), "b".into()]);
+        let clip = file.for_space(&space).expect("a good clip");
+        let mut pose = vec![0.0; space.len()];
+        for k in 0..=40 {
+            clip.pose(f64::from(k) / 40.0, &mut pose);
+            let off = (pose[7] - turn(2)).abs();
+            assert!(off < 0.1, "yaw {:.2} rad at {k}/40 of the way", pose[7]);
+        }
     }
 }

@@ -2,8 +2,10 @@
 
 use super::file::{ClipError, ClipFile, ClipKind};
 use super::{Clip, Limb};
+use crate::base::angle::wrap_pi;
 use crate::body::{BODY, JointSpace, PoseSpace, RootPose, SkeletonSpace};
 use crate::motion::spline::{Ends, Spline};
+use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -67,9 +69,10 @@ impl ClipFile {
             }
         }
         let width = self.frames.first().map_or(0, Vec::len);
+        let body = self.turned_evenly();
         let value = |k: usize, column: &Option<usize>| match column {
             Some(c) if *c < width => self.frames[k][*c],
-            Some(c) => self.body[k][*c - width],
+            Some(c) => body[k][*c - width],
             None => 0.0,
         };
         let mut frames: Vec<Vec<f64>> = (0..self.frames.len())
@@ -126,6 +129,20 @@ impl ClipFile {
             spline: Spline::new(&frames, ends),
             way: self.rates(ends),
         })
+    }
+
+    /// The body's rows with angles that go on from row to row. They begin in -3/4..5/4 of half a turn, so that
+    /// root links whose axes are turned by quarters look alike in all clips.
+    fn turned_evenly(&self) -> Vec<[f64; 6]> {
+        let mut rows = self.body.clone();
+        let mut near = [0.25 * PI; 3];
+        for row in &mut rows {
+            for (angle, near) in row[3..].iter_mut().zip(&mut near) {
+                *angle = *near + wrap_pi(*angle - *near);
+                *near = *angle;
+            }
+        }
+        rows
     }
 
     /// Parts of a frame, with the columns of each; the body's lie behind the frame's own.
