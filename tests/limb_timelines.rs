@@ -30,10 +30,10 @@ fn read(path: &Path) -> String {
 
 fn pup_body() -> (JointSpace, RobotFeet) {
     let model = RobotModel::from_urdf(&read(&config("robots/pup.urdf"))).expect("pup");
-    let (legs, facing) = Leg::find_all_facing(&model, None).expect("legs");
+    let (legs, _) = Leg::find_all_facing(&model, None).expect("legs");
     (
         JointSpace::of_robot(&model, true),
-        RobotFeet::new(model, legs, facing),
+        RobotFeet::new(model, legs),
     )
 }
 
