@@ -29,8 +29,17 @@ fn character() -> Character {
 
 /// Height of the hand over the base, metres.
 fn hand_m(character: &Character, positions: &[f64]) -> f64 {
-    let link = character.model.link("end_effector_link").expect("a hand");
-    character.model.link_pose(link, positions).translation.z
+    let link = character
+        .robot()
+        .expect("a robot")
+        .link("end_effector_link")
+        .expect("a hand");
+    character
+        .robot()
+        .expect("a robot")
+        .link_pose(link, positions)
+        .translation
+        .z
 }
 
 /// Frequency of a signal by its first and last rise through its mean, Hz.
@@ -170,7 +179,7 @@ fn reaches(character: &Character, space: &dyn PoseSpace) -> Vec<Clip> {
 #[test]
 fn the_height_of_the_hand_has_an_inverse_at_every_point_of_the_reach() {
     let character = character();
-    let space = JointSpace::of_robot(&character.model, false);
+    let space = JointSpace::of_robot(character.robot().expect("a robot"), false);
     let clips = reaches(&character, &space);
     for progression in [0.25, 0.5, 1.0] {
         let n = space.len();

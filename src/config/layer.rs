@@ -117,7 +117,7 @@ pub(super) fn layer_parts(
         joints: entry.joints.clone(),
         frequency_hz: entry.frequency_hz,
         idle_only: entry.idle_only,
-        line: at.line_of(span.start),
+        line: at.line_of((entry.channel.as_ref()).map_or(span.start, |c| c.span().start)),
     })
 }
 
