@@ -135,7 +135,10 @@ impl Pins {
                 Vector3::zeros()
             };
             let wanted = if pin.on_ground { RELEASE } else { CONTACT };
-            let down = if votes[i].is_finite() {
+            let down = if self.begun && !(dt_s > 0.0) {
+                // No time has passed: nothing lands, nothing lifts off.
+                pin.on_ground
+            } else if votes[i].is_finite() {
                 votes[i] > wanted
             } else {
                 // The motion does not tell: low and slow is on the ground.
