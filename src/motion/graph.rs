@@ -365,6 +365,10 @@ impl Graph {
         }
         let others = |to: usize| to != transition.from && to != transition.to;
         let third = self.strongest(asks, |to| others(to) && self.reaches(to))?;
+        if self.routes.next(transition.from, third) == Some(transition.to) {
+            (transition.goal, transition.aborting) = (third, false);
+            return None;
+        }
         // From whichever of the two shows more.
         let shown = if self.blend() > 0.5 {
             transition.to
@@ -372,10 +376,6 @@ impl Graph {
             transition.from
         };
         let to = self.routes.next(shown, third)?;
-        if to == transition.to {
-            (transition.goal, transition.aborting) = (third, false);
-            return None;
-        }
         // Back to the source at once, too, when the way leads through it.
         self.transition = None;
         self.counts.interrupted += 1;
