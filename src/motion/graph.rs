@@ -247,9 +247,7 @@ impl Graph {
         let here = asks[self.active];
         // While the active class is performed it is left only for a stronger one.
         let best = self.strongest(asks, |to| self.reaches(to)).filter(|to| {
-            here.done
-                || !(here.hold >= self.options.release)
-                || asks[*to].activation > here.hold
+            here.done || !(here.hold >= self.options.release) || asks[*to].activation > here.hold
         });
         let back = self.active != self.start
             && self.reaches(self.start)
