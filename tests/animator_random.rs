@@ -1,4 +1,4 @@
-//! Random gestures on the shipped walkers, ten minutes on four legs and two on six: limits kept, nothing jumps, feet stay where they stand.
+//! Random gestures on the shipped walkers, two minutes on four legs and half a one on six: limits kept, nothing jumps, feet stay where they stand.
 
 mod support;
 
@@ -220,7 +220,10 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
         "{name}: a foot slid {:.2} mm in one stance",
         slides.worst_mm()
     );
-    assert!(counts.completed > 20, "{name}: only {counts:?}");
+    assert!(
+        f64::from(counts.completed) > 2.0 * minutes,
+        "{name}: only {counts:?} in {minutes} minutes"
+    );
     assert!(
         jump_m < 0.01 && jump_rad < 0.05,
         "{name}: root jumps {jump_m} m, {jump_rad} rad"
@@ -236,8 +239,8 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
 fn minutes_of_random_gestures_keep_limits_and_feet() {
     for (name, character) in shipped() {
         match name.as_str() {
-            "quadruped.toml" => perform(&name, &character, 10.0, 7),
-            "hexapod.toml" => perform(&name, &character, 2.0, 7),
+            "quadruped.toml" => perform(&name, &character, 2.0, 7),
+            "hexapod.toml" => perform(&name, &character, 0.5, 7),
             _ => {}
         }
     }
