@@ -370,7 +370,7 @@ impl Puppet {
                 drive.amplitude = input.channel.map_or(0.0, weigh);
                 continue;
             };
-            let mut estimate = self.estimates[gesture].clone();
+            let mut estimate = self.estimates[gesture];
             if input.reverse {
                 estimate.frequency_hz = -estimate.frequency_hz;
                 estimate.phase_rad = TAU - estimate.phase_rad;
@@ -393,7 +393,9 @@ impl Puppet {
                 f64::NAN
             };
         }
-        // Gestures that are learnt while a run goes on drive no layer, and find no room here.
+        // Gestures that are learnt while a run goes on drive no layer, and find no room here; one that is gone
+        // is not performed any more.
+        self.waves.fill(Drive::default());
         for (wave, estimate) in self.waves.iter_mut().zip(&self.estimates) {
             *wave = Drive {
                 amplitude: estimate.amplitude * share,

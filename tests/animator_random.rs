@@ -1,4 +1,4 @@
-//! Ten minutes of random gestures on the shipped walkers: limits kept, nothing jumps, feet stay where they stand.
+//! Random gestures on the shipped walkers, two minutes on four legs and half a one on six: limits kept, nothing jumps, feet stay where they stand.
 
 mod support;
 
@@ -96,13 +96,6 @@ impl<'a> SlideWatch<'a> {
                 }
                 (true, Some(began)) => {
                     let d = (at.xy() - began.xy()).norm();
-                    if d > 0.002 && stance.slid_m <= 0.002 && std::env::var("PROBE").is_ok() {
-                        println!(
-                            "SLIDE foot {foot} {:.2} mm at {at} began {began} pose {:?}",
-                            1e3 * d,
-                            &pose[3 * foot..3 * foot + 3]
-                        );
-                    }
                     stance.slid_m = stance.slid_m.max(d);
                 }
                 (false, Some(_)) => {
@@ -160,8 +153,6 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
     let mut slides = SlideWatch::new(feet);
     let mut root = animator.root();
     let (mut held_back, mut allocated) = (0_u32, 0);
-    let (mut was, mut shown_events, mut last_change, mut last_ground) =
-        (false, 0, 0_usize, vec![false; feet.count()]);
     let (mut jump_m, mut jump_rad): (f64, f64) = (0.0, 0.0);
     let cycles = (minutes * 60.0 * RATE_HZ) as usize;
     for cycle in 0..cycles {
@@ -189,47 +180,8 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
             gestures: &waves,
         };
         animator.step(&drives, &input, DT_S, &mut pose);
-        let before_sent = sent.clone();
-        let hb = envelope.pass(&pose[..joints], &mut sent) > 0;
-        if hb && !was && std::env::var("PROBE").is_ok() && shown_events < 25 {
-            shown_events += 1;
-            let worst = (0..joints)
-                .max_by(|a, b| {
-                    (pose[*a] - sent[*a])
-                        .abs()
-                        .total_cmp(&(pose[*b] - sent[*b]).abs())
-                })
-                .unwrap();
-            let pins = animator.pins().unwrap();
-            let g: Vec<bool> = (0..feet.count()).map(|f| pins.on_ground(f)).collect();
-            let changed: Vec<usize> = (0..g.len()).filter(|i| g[*i] != last_ground[*i]).collect();
-            println!(
-                "c {cycle} joint {worst} off {:.5} v {:.2} active {} tr {:?} blend {:?} changed {changed:?} since {:?} played {:?} amp {:.2} f {:.2} limbs {:?}",
-                pose[worst] - sent[worst],
-                (sent[worst] - before_sent[worst]) / DT_S,
-                animator.active(),
-                animator
-                    .transition()
-                    .map(|t| (t.0.from, t.0.to, t.0.aborting)),
-                animator.transition().map(|t| t.1),
-                cycle - last_change,
-                animator.played()[0].stride,
-                waves[0].amplitude,
-                waves[0].frequency_hz,
-                animator.played()[0].locked
-            );
-        }
-        was = hb;
-        {
-            let pins = animator.pins().unwrap();
-            for f in 0..feet.count() {
-                if pins.on_ground(f) != last_ground[f] {
-                    last_change = cycle;
-                    last_ground[f] = pins.on_ground(f);
-                }
-            }
-        }
-        held_back += u32::from(hb);
+        let held = envelope.pass(&pose[..joints], &mut sent) > 0;
+        held_back += u32::from(held);
         if cycle > 10 {
             allocated += allocations() - before;
         }
@@ -247,16 +199,6 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
         let mut shown = pose.clone();
         shown[..joints].copy_from_slice(&sent);
         let pins = animator.pins().expect("pinned feet");
-        if std::env::var("PROBE").is_ok() {
-            print!(
-                "{}",
-                if cycle % 1 == 0 {
-                    format!("")
-                } else {
-                    String::new()
-                }
-            );
-        }
         slides.see(|foot| pins.on_ground(foot), &root, &shown);
     }
     let counts = animator.counts();
@@ -272,16 +214,16 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
         jump_rad,
         limits.extremes(),
     );
-    if std::env::var("PROBE").is_ok() {
-        return;
-    }
     assert_eq!(allocated, 0, "{name}: allocations in the step");
     assert!(
         slides.worst_mm() < 2.0,
         "{name}: a foot slid {:.2} mm in one stance",
         slides.worst_mm()
     );
-    assert!(counts.completed > 20, "{name}: only {counts:?}");
+    assert!(
+        f64::from(counts.completed) > 2.0 * minutes,
+        "{name}: only {counts:?} in {minutes} minutes"
+    );
     assert!(
         jump_m < 0.01 && jump_rad < 0.05,
         "{name}: root jumps {jump_m} m, {jump_rad} rad"
@@ -294,18 +236,12 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
 }
 
 #[test]
-fn ten_minutes_of_random_gestures_keep_limits_and_feet() {
+fn minutes_of_random_gestures_keep_limits_and_feet() {
     for (name, character) in shipped() {
-        if std::env::var("NAME").is_ok_and(|n| !name.contains(&n)) {
-            continue;
-        }
-        // A character of one class has no transitions to be tried; an avatar has no limits.
-        if character.classes.len() > 1 && character.body.avatar.is_none() {
-            let minutes = std::env::var("MINUTES")
-                .ok()
-                .and_then(|m| m.parse().ok())
-                .unwrap_or(10.0);
-            perform(&name, &character, minutes, 7);
+        match name.as_str() {
+            "quadruped.toml" => perform(&name, &character, 2.0, 7),
+            "hexapod.toml" => perform(&name, &character, 0.5, 7),
+            _ => {}
         }
     }
 }

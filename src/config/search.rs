@@ -64,11 +64,10 @@ pub(super) fn search_parts(
     }
     let find = |name: &str, span: std::ops::Range<usize>| {
         let names: Vec<&str> = classes.iter().map(|c| c.name.as_str()).collect();
-        let found = names.iter().position(|n| *n == name).ok_or_else(|| {
+        names.iter().position(|n| *n == name).ok_or_else(|| {
             let problem = format!("no class {name:?}. Classes: {}", names.join(", "));
             at.at(span, "graph.search.edges", problem)
-        });
-        found
+        })
     };
     let edges = match &entry.edges {
         None => None,

@@ -38,6 +38,9 @@ pub struct Animator {
     difference: Vec<f64>,
     last_dt_s: f64,
     root: RootPose,
+    /// How the body travelled in the last step, and what a jump left of it, per second.
+    root_velocity: RootAdvance,
+    root_carry: RootAdvance,
 }
 
 /// Feet that stay where they stand, and which limb of each class they belong to.
@@ -91,6 +94,8 @@ impl Animator {
             space,
             last_dt_s: 0.0,
             root: RootPose::default(),
+            root_velocity: RootAdvance::default(),
+            root_carry: RootAdvance::default(),
         }
     }
 
@@ -110,6 +115,12 @@ impl Animator {
             votes: vec![0.0; feet.count()],
             pins: Pins::new(feet, &standing),
         });
+        self
+    }
+
+    /// Starts the way at `root`.
+    pub fn with_root(mut self, root: RootPose) -> Self {
+        self.root = root;
         self
     }
 
@@ -179,6 +190,9 @@ impl Animator {
         if dt_s > 0.0 {
             std::mem::swap(&mut self.shown, &mut self.shown_before);
             self.shown.copy_from_slice(out);
+            if self.last_dt_s == 0.0 {
+                self.shown_before.copy_from_slice(out);
+            }
             self.last_dt_s = dt_s;
         }
         for layer in &mut self.layers {
@@ -202,8 +216,10 @@ impl Animator {
             class.show(shown, &drives[node]);
             let pose = &mut self.poses[node * len..(node + 1) * len];
             self.played[node] = class.step(self.space.as_ref(), drives[node], dt_s, pose);
+            let number = |v: f64| if v.is_finite() { v } else { 0.0 };
             self.asks[node] = Ask {
-                activation: class.activation(&drives[node]),
+                activation: number(class.activation(&drives[node])),
+                hold: number(class.hold(&drives[node])),
                 may_leave: class.may_leave(),
                 done: class.done(),
             };
@@ -266,6 +282,10 @@ impl Animator {
             && let Some(class) = self.classes[before.from].clips_mut()
         {
             class.leave_route();
+            if event != (Event::Jumped { to: before.to }) {
+                // Given up: what was chosen is of no use to another transition.
+                self.choice = None;
+            }
         }
     }
 
@@ -286,10 +306,20 @@ impl Animator {
             self.played[to] = class.step(self.space.as_ref(), *drive, dt_s, pose);
             self.poses[of.clone()].copy_from_slice(pose);
         }
+        // Where the entered motion would have been one step earlier.
+        let before = &mut self.pair[..len];
+        before.copy_from_slice(&self.last_poses[of.clone()]);
+        if dt_s > 0.0 {
+            self.space.diff(before, pose, &mut self.difference);
+            let back = -self.last_dt_s / dt_s;
+            self.space.add(before, &self.difference, back);
+        }
+        self.root_carry = self.root_velocity;
+        self.root_carry.add(self.played[to].root_velocity, -1.0);
         self.inertia.take_up(
             self.space.as_ref(),
             (&self.shown, &self.shown_before),
-            (&self.last_poses[of], pose),
+            (&self.last_poses[of], before),
             self.last_dt_s,
             self.graph.blend_s(),
             &self.fastest,
@@ -301,6 +331,11 @@ impl Animator {
         let parts = [(Some(active), 1.0 - blend), (entering, blend)];
         for (node, share) in parts.into_iter().filter_map(|(n, s)| n.map(|n| (n, s))) {
             velocity.add(self.played[node].root_velocity, share);
+        }
+        // The body does not stop at a jump either.
+        velocity.add(self.root_carry, self.inertia.left());
+        if dt_s > 0.0 {
+            self.root_velocity = velocity;
         }
         self.root.travel(velocity.scaled(dt_s));
     }
@@ -315,6 +350,7 @@ impl Animator {
     ) {
         let Some(feet) = &mut self.pins else { return };
         let count = feet.votes.len();
+        let fades = self.inertia.active();
         for (foot, vote) in feet.votes.iter_mut().enumerate() {
             let of = |node: usize| {
                 feet.limbs[node * count + foot].map_or(self.classes[node].stands(), |limb| {
@@ -323,6 +359,8 @@ impl Animator {
             };
             *vote = match entering {
                 Some(to) => (1.0 - blend) * of(active) + blend * of(to),
+                // After a jump a foot in the air lands when it gets there.
+                None if fades && !feet.pins.on_ground(foot) => f64::NAN,
                 None => of(active),
             };
         }

@@ -156,9 +156,11 @@ struct State {
     limb_shift: Vec<f64>,
     locked: bool,
     stride: f64,
-    /// Of a class that plays once: where it is, and whether it was asked for since it ended.
+    /// Of a class that plays once: where it is, whether it is at its end, and whether its gesture was released
+    /// since it began.
     progress: f64,
     ended: bool,
+    fresh: bool,
 }
 
 /// What a class did in one step, for the view and for tests.
@@ -248,20 +250,33 @@ impl MotionClass {
             // Once begun it is played whatever the gesture does; ended, it waits for the next time.
             Play::Once if self.state.ended => 0.0,
             Play::Once if self.state.progress > 0.0 => 1.0,
+            Play::Once if !self.state.fresh => 0.0,
             _ => drive.amplitude,
+        }
+    }
+
+    /// How much the class is held on to while another is asked for.
+    pub(super) fn hold(&self, drive: &Drive) -> f64 {
+        match self.options.play {
+            // It goes on by itself up to where it may be left; there its gesture decides.
+            Play::Once if !self.state.ended && drive.frequency_hz >= 0.0 => drive.amplitude,
+            _ => self.activation(drive),
         }
     }
 
     /// Tells a class whether it shows (is active or being entered): only then the clock moves it.
     pub(super) fn show(&mut self, shown: bool, drive: &Drive) {
-        self.shown = shown;
-        if !shown && self.options.play == Play::Once {
-            self.state.progress = 0.0;
-            if !(drive.amplitude > FULL_FROM_AMPLITUDE) {
-                // The gesture was released: the next one plays it anew.
-                self.state.ended = false;
+        if self.options.play == Play::Once {
+            if shown && !self.shown {
+                self.state.fresh = false;
+            }
+            // The gesture was released: the next one plays it anew.
+            self.state.fresh |= !(drive.amplitude > FULL_FROM_AMPLITUDE);
+            if !shown {
+                (self.state.progress, self.state.ended) = (0.0, false);
             }
         }
+        self.shown = shown;
     }
 
     /// Where the class is: fraction of its cycle or path, and its parameters.

@@ -19,6 +19,8 @@ pub struct EdgeSearch {
 pub struct Choice {
     /// The source plays on for this long, seconds.
     pub wait_s: f64,
+    /// And is left at this fraction of its cycle.
+    pub exit: f64,
     /// The target is entered at this fraction of its cycle or path.
     pub entry: f64,
     /// Similarity of the two poses, 0..1.
@@ -62,6 +64,7 @@ impl EdgeSearch {
         let found = self.search.find(&source, &target)?;
         Ok(Choice {
             wait_s: found.exit_after_s,
+            exit: found.exit.t,
             entry: found.entry.t,
             similarity: found.similarity,
         })

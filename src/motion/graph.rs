@@ -46,6 +46,9 @@ impl Default for GraphOptions {
 pub struct Ask {
     /// How much its gesture asks for it, 0..1.
     pub activation: f64,
+    /// How much it is held on to while another is asked for, 0..1: its activation, but for a class that plays
+    /// once, which goes on by itself and yet gives way where it may be left.
+    pub hold: f64,
     /// It is at a point where it may be left.
     pub may_leave: bool,
     /// It has played to its end and waits to be left.
@@ -57,6 +60,7 @@ impl Ask {
     pub fn with(activation: f64) -> Self {
         Self {
             activation,
+            hold: activation,
             may_leave: true,
             done: false,
         }
@@ -243,9 +247,7 @@ impl Graph {
         let here = asks[self.active];
         // While the active class is performed it is left only for a stronger one.
         let best = self.strongest(asks, |to| self.reaches(to)).filter(|to| {
-            here.done
-                || here.activation < self.options.release
-                || asks[*to].activation > here.activation
+            here.done || !(here.hold >= self.options.release) || asks[*to].activation > here.hold
         });
         let back = self.active != self.start
             && self.reaches(self.start)
@@ -298,7 +300,7 @@ impl Graph {
         let asked = asks[transition.goal].activation;
         let to_start = transition.goal == self.start
             && (self.idle_for_s > self.options.idle_s || asks[transition.from].done);
-        if !to_start && asked < self.options.abort {
+        if !to_start && !(asked >= self.options.abort) {
             transition.aborting = true;
         } else if asked > self.options.rise {
             transition.aborting = false;
@@ -306,7 +308,7 @@ impl Graph {
         if let Some(wait_s) = transition.jump_in_s {
             return self.wait(transition, wait_s - dt_s);
         }
-        if let Some(event) = self.interrupt(&transition, asks) {
+        if let Some(event) = self.interrupt(&mut transition, asks) {
             return event;
         }
         // The joints may need longer than they seemed to when the blend began.
@@ -330,7 +332,7 @@ impl Graph {
             && (to_start
                 || transition.to != transition.goal
                 || asks[transition.from].done
-                || asks[transition.from].activation < self.options.release)
+                || !(asks[transition.from].hold >= self.options.release))
         {
             self.arrive(transition);
         }
@@ -353,13 +355,18 @@ impl Graph {
         Event::Jumped { to: transition.to }
     }
 
-    /// A third class is asked for while the target is given up: enter it at once.
-    fn interrupt(&mut self, transition: &Transition, asks: &[Ask]) -> Option<Event> {
+    /// A third class is asked for while the target is given up: enter it at once, or, where the way there leads
+    /// through the target, go on to that.
+    fn interrupt(&mut self, transition: &mut Transition, asks: &[Ask]) -> Option<Event> {
         if !transition.aborting {
             return None;
         }
         let others = |to: usize| to != transition.from && to != transition.to;
         let third = self.strongest(asks, |to| others(to) && self.reaches(to))?;
+        if self.routes.next(transition.from, third) == Some(transition.to) {
+            (transition.goal, transition.aborting) = (third, false);
+            return None;
+        }
         // From whichever of the two shows more.
         let shown = if self.blend() > 0.5 {
             transition.to
@@ -367,11 +374,9 @@ impl Graph {
             transition.from
         };
         let to = self.routes.next(shown, third)?;
+        // Back to the source at once, too, when the way leads through it.
         self.transition = None;
         self.counts.interrupted += 1;
-        if to == self.active {
-            return None;
-        }
         self.active = to;
         Some(Event::Jumped { to })
     }

@@ -44,9 +44,18 @@ impl Inertia {
         }
     }
 
-    /// Takes up a jump: `shown` and `shown_before` are the poses of this and the last step as they would go
-    /// on without it, `played` and `played_before` those that are played from now on. Faded over at least
-    /// `span_s`.
+    /// Whether something is being faded, and the part of it that is left, 0..1.
+    pub fn left(&self) -> f64 {
+        if self.active() {
+            1.0 - super::smooth::ease(self.since_s / self.span_s)
+        } else {
+            0.0
+        }
+    }
+
+    /// Takes up a jump: `shown` are the poses of the last step and of the one before it, `dt_s` apart, as they
+    /// were shown; `played` those of the motion that is played from now on, at the same two instants. Faded over
+    /// at least `span_s`.
     ///
     /// `fastest`: most that each tangent coordinate may be moved by the fade, (per second, per second
     /// squared); coordinates beyond its end are free.

@@ -131,6 +131,14 @@ impl Node {
         }
     }
 
+    /// How much it is held on to while another class is asked for.
+    pub(super) fn hold(&self, drive: &Drive) -> f64 {
+        match self {
+            Node::Clips(class) => class.hold(drive),
+            Node::Direct(_) => self.activation(drive),
+        }
+    }
+
     /// One step of `dt_s` under `drive`; the pose goes into `out`. Allocates nothing.
     pub fn step(
         &mut self,

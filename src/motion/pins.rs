@@ -18,8 +18,10 @@ const SLOW_PER_S: f64 = 0.4;
 const RETURN_RATE: f64 = 14.0;
 /// How fast a foot comes to rest at touch-down, 1/s: what it still moves is a 60th of its speed.
 const LANDING_RATE: f64 = 60.0;
-/// How fast it comes to ground height, 1/s.
+/// How fast it comes to ground height, 1/s, and with what acceleration at most, m/s^2: a foot that is put down
+/// from high up (a paw that was held out) must not be snatched.
 const SETTLING_RATE: f64 = 40.0;
+const SETTLING_M_S2: f64 = 8.0;
 /// In flight an offset is taken back at most with this part of the foot's own speed, so that the shown
 /// foot keeps between half and one and a half of it.
 const FLIGHT_SPEED: f64 = 0.5;
@@ -41,6 +43,7 @@ struct Pin {
     velocity: Vector3<f64>,
     /// Height over the ground while it stands.
     height: Follower,
+    settling_rate: f64,
     /// In flight: from the unconstrained foot to the shown one.
     offset: [Follower; 3],
     /// Where the unconstrained foot was.
@@ -52,11 +55,13 @@ impl Pin {
     fn stand(&mut self, ground_m: f64, dt_s: f64) {
         if !self.on_ground {
             self.height = Follower::moving(self.at.z, self.velocity.z);
+            let drop_m = (self.at.z - ground_m).abs().max(1e-9);
+            self.settling_rate = SETTLING_RATE.min((SETTLING_M_S2 / drop_m).sqrt());
         }
         self.velocity *= (-LANDING_RATE * dt_s).exp();
         self.at.x += self.velocity.x * dt_s;
         self.at.y += self.velocity.y * dt_s;
-        self.at.z = self.height.step(ground_m, SETTLING_RATE, 1e3, dt_s);
+        self.at.z = (self.height).step(ground_m, self.settling_rate, 1e3, dt_s);
         self.velocity.z = self.height.speed();
     }
 
@@ -142,7 +147,10 @@ impl Pins {
                 Vector3::zeros()
             };
             let wanted = if pin.on_ground { RELEASE } else { CONTACT };
-            let down = if votes[i].is_finite() {
+            let down = if self.begun && !(dt_s > 0.0) {
+                // No time has passed: nothing lands, nothing lifts off.
+                pin.on_ground
+            } else if votes[i].is_finite() {
                 votes[i] > wanted
             } else {
                 // The motion does not tell: low and slow is on the ground.

@@ -190,6 +190,7 @@ impl MotionClass {
                 stride: 1.0,
                 progress: 0.0,
                 ended: false,
+                fresh: true,
             },
             sampled: vec![0.0; count * coordinates],
             weights: vec![0.0; count],

@@ -14,6 +14,9 @@ const LEAST_STRIDE: f64 = 0.4;
 /// The phase may gain or lose this part of the tempo to meet the gesture's: out of phase by half a
 /// turn at the onset, it locks within two periods.
 const CATCH_UP: f64 = 0.4;
+/// How closely the way to an exit is followed, 1/s, and how fast amplitude and frequency may change on it, 1/s.
+const ROUTE_RATE: f64 = 30.0;
+const ROUTE_SPEED: f64 = 8.0;
 /// Share of the joints' speed and acceleration that catching up may use.
 const CATCH_UP_SHARE: f64 = 0.8;
 
@@ -39,15 +42,15 @@ impl MotionClass {
         let state = &mut self.state;
         let mut coming_hz: f64 = 0.0;
         if let Some((amplitude, frequency_hz)) = on_route {
-            // The way to an exit was chosen pose by pose: it is gone as it is, by the clock.
-            state.amplitude = Follower::at(amplitude);
-            state.frequency = Follower::at(frequency_hz);
-            drive.phase_rad = state.phase + TAU * frequency_hz * dt_s;
+            // The way to an exit was chosen pose by pose: it is gone closely, by the clock, but without the
+            // kinks that it has between its points.
+            (state.amplitude).step(amplitude, ROUTE_RATE, ROUTE_SPEED, dt_s);
+            (state.frequency).step(frequency_hz, ROUTE_RATE, ROUTE_SPEED, dt_s);
+            drive.phase_rad = state.phase + TAU * state.frequency.value * dt_s;
+        } else {
+            (state.amplitude).step(wanted.min(1.0), 9.0, 1.7, dt_s);
         }
-        let amplitude = state
-            .amplitude
-            .step(wanted.min(1.0), 9.0, 1.7, dt_s)
-            .max(0.0);
+        let amplitude = state.amplitude.value.max(0.0);
         if on_route.is_none() && performed && drive.frequency_hz.is_finite() && wanted > 0.0 {
             let goal = drive.frequency_hz.clamp(0.2 * lowest_hz, 3.0 * highest_hz);
             if amplitude < AT_REST {
@@ -110,7 +113,7 @@ impl MotionClass {
         let follow = 1.0 - (-dt_s / 0.06).exp();
         state.rate += (goal_rate - state.rate) * follow;
         let at_rest = amplitude < AT_REST;
-        if at_rest {
+        if at_rest && on_route.is_none() {
             // Standing still: nobody sees the phase, so it may be right when the first step comes.
             state.rate = goal_rate;
             state.phase = drive.phase_rad;
