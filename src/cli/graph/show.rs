@@ -6,6 +6,7 @@ use super::matrix::matrix_svg;
 use super::{load, make_folder, write};
 use crate::cli::{ExitStatus, Failure, say};
 use crate::config::Character;
+use crate::motion::class::Play;
 use crate::motion::clip::ClipKind;
 use std::path::Path;
 
@@ -77,11 +78,15 @@ fn lines(character: &Character, node: usize) -> Vec<String> {
         .and_then(|g| character.gestures.gestures.get(g))
     {
         Some(gesture) => lines.push(format!(
-            "gesture {} ({})",
+            "gesture {} ({}{})",
             gesture.name,
-            gesture.kind.name()
+            gesture.kind.name(),
+            if class.reverse { ", reversed" } else { "" }
         )),
-        None => lines.push("no gesture: played while nothing is performed".into()),
+        None => lines.push(match class.channel_name() {
+            Some(channel) => format!("channel {channel}"),
+            None => "no gesture: played while nothing is performed".into(),
+        }),
     }
     if class.map.is_some() {
         lines.push("pose map: the pose itself drives it".into());
@@ -89,10 +94,23 @@ fn lines(character: &Character, node: usize) -> Vec<String> {
     for example in class.examples() {
         let (amplitude, frequency_hz) = (example.parameters[0], example.parameters[1]);
         let name = &example.clip.name;
+        let further: String = (class
+            .options
+            .extra
+            .iter()
+            .zip(example.parameters.as_slice().iter().skip(2)))
+        .filter(|(_, v)| **v != 0.0)
+        .map(|(name, v)| format!(", {name} {v}"))
+        .collect();
         lines.push(match example.clip.kind {
-            ClipKind::Path => format!("{name}: a path, progression 0 to 1"),
-            ClipKind::Cycle if amplitude == 0.0 => format!("{name}: at rest"),
-            ClipKind::Cycle => format!("{name}: amplitude {amplitude}, {frequency_hz} Hz"),
+            ClipKind::Path if class.options.play == Play::Once => {
+                format!("{name}: a path, once, by the clock{further}")
+            }
+            ClipKind::Path => format!("{name}: a path, progression 0 to 1{further}"),
+            ClipKind::Cycle if amplitude == 0.0 => format!("{name}: at rest{further}"),
+            ClipKind::Cycle => {
+                format!("{name}: amplitude {amplitude}, {frequency_hz} Hz{further}")
+            }
         });
     }
     lines
