@@ -117,7 +117,7 @@ fn when_a_class_may_be_left() {
     let key = "# leave = [[0.0, 0.2], [0.5, 0.7]]";
     pup(key, "leave = [[0.0, 1.2]]", &["class.leave", "1.2", "0"]);
     pup(key, "leave = [[nan, 0.5]]", &["class.leave", "0"]);
-    pup(key, "leave = [0.1, 0.2]", &["0.1", "sequence"]);
+    pup(key, "leave = [0.1, 0.2]", &["0.1", "array of length 2"]);
 }
 
 #[test]
