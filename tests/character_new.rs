@@ -129,7 +129,7 @@ fn feet_without_links_of_their_own_get_them() {
 }
 
 #[test]
-fn the_shipped_hexapod_plays_its_performance_inside_its_limits() {
+fn the_shipped_hexapod_greets_inside_its_limits() {
     let config = format!("{}/configs/hexapod.toml", env!("CARGO_MANIFEST_DIR"));
     plays(&Folder::empty(), &config, BOWING, 1);
 }

@@ -52,7 +52,7 @@ pub(super) fn graph_svg(title: &str, boxes: &[Box], arrows: &[Arrow]) -> String 
         0 | 1 => (0.0, 0.0),
         2 => (0.5 * (wide + 150.0), 0.0),
         _ => (
-            (wide + 90.0) / chord.max(0.5),
+            (wide + 150.0) / chord.max(0.5),
             (high + 90.0) / chord.max(0.5),
         ),
     };
