@@ -33,11 +33,12 @@ fn way(gait: GaitName, [forward, left, turn]: [f64; 3]) -> GaitDescription {
 
 #[test]
 fn feet_in_stance_stay_on_their_spot_in_the_world_on_every_robot() {
-    for robot in robots() {
+    // ANYmal C has the legs of ANYmal B; the next test has it.
+    for robot in robots().iter().filter(|r| r.name != "anymal_c") {
         for gait in robot.gaits() {
-            for (name, advance) in ways(&robot) {
+            for (name, advance) in ways(robot) {
                 let authored = robot.author(&way(gait, advance));
-                let found = feet(&robot, &authored.file);
+                let found = feet(robot, &authored.file);
                 let what = format!("{} {gait:?} {name}: {found:?}", robot.name);
                 assert!(found.slip_m < 2e-4, "{what}");
                 assert!(found.off_ground_m < 2e-4, "{what}");

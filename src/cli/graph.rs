@@ -32,9 +32,9 @@ enum GraphCommand {
   handwave graph show configs/quadruped.toml --out graph.svg
       a picture of the graph, and in graph_edges/ one similarity matrix per edge
 
-A similarity matrix has a row for every pose of the class that is left (clip by clip, phase 0 to 1) and a
-column for every pose of the one that is entered: yellow is equal, dark blue as different as any two poses
-of these classes. A transition is smooth where it is bright.")]
+A similarity matrix has a row for every pose of the class that is left (clip by clip, phase 0 to
+1) and a column for every pose of the one that is entered: yellow is equal, dark blue as
+different as any two poses of these classes. A transition is smooth where it is bright.")]
     Show {
         /// The character (default: the built-in quadruped)
         config: Option<PathBuf>,
@@ -49,9 +49,9 @@ of these classes. A transition is smooth where it is bright.")]
   handwave graph check my_character.toml --s-min 0.9
 
 Broken (exit 2): a class that no way from the start leads to, a class without a way back to it.
-Warnings (exit 0): an edge whose best transition is less similar than --s-min or farther than --far-mm apart,
-a clip whose parameters the gesture cannot reach. The distance of two poses is the root mean square over
-joints of joint position times lever arm, speeds included.")]
+Warnings (exit 0): an edge whose best transition is less similar than --s-min or farther than
+--far-mm apart, a clip whose parameters the gesture cannot reach. The distance of two poses is
+the root mean square over joints of joint position times lever arm, speeds included.")]
     Check {
         /// The character (default: the built-in quadruped)
         config: Option<PathBuf>,

@@ -80,6 +80,11 @@ impl ClassParts {
         self.examples.iter().map(|e| e.clip.name.clone()).collect()
     }
 
+    /// The channel that drives the class in place of a gesture.
+    pub fn channel_name(&self) -> Option<&str> {
+        self.channel.as_ref().map(|c| c.channel.as_str())
+    }
+
     /// What drives the class, bound to the channels of `front`.
     pub(super) fn input(
         &self,
@@ -243,10 +248,8 @@ pub(super) fn class_parts(
             map: None,
             options: ClassOptions {
                 play,
-                leave: class.leave.clone(),
-                limb_advance: class
-                    .limb_advance
-                    .unwrap_or(ClassOptions::default().limb_advance),
+                leave: leave(class, at)?,
+                limb_advance: limb_advance(class, at)?,
                 weights: weights(class, at)?,
                 extra: names,
             },
@@ -304,6 +307,34 @@ fn play(class: &ClassEntry, at: &Pointer<'_>) -> Result<Play, ConfigError> {
             return Err(at.at(play.span(), "class.play", problem));
         }
     })
+}
+
+/// When a class may be left.
+fn leave(class: &ClassEntry, at: &Pointer<'_>) -> Result<Vec<[f64; 2]>, ConfigError> {
+    let Some(windows) = &class.leave else {
+        return Ok(Vec::new());
+    };
+    let unit = 0.0..=1.0;
+    let bad = |w: &&[f64; 2]| !(unit.contains(&w[0]) && unit.contains(&w[1]));
+    if let Some([from, to]) = windows.get_ref().iter().find(bad) {
+        let problem =
+            format!("[{from}, {to}]: both must lie in 0..1, fractions of the cycle or path");
+        return Err(at.at(windows.span(), "class.leave", problem));
+    }
+    Ok(windows.get_ref().clone())
+}
+
+/// What a limb may gain or lose against the body.
+fn limb_advance(class: &ClassEntry, at: &Pointer<'_>) -> Result<f64, ConfigError> {
+    let Some(part) = &class.limb_advance else {
+        return Ok(ClassOptions::default().limb_advance);
+    };
+    let value = *part.get_ref();
+    if !(0.0..1.0).contains(&value) {
+        let problem = format!("{value} is not in 0..1 (below 1)");
+        return Err(at.at(part.span(), "class.limb_advance", problem));
+    }
+    Ok(value)
 }
 
 /// How a class turns parameters into weights.

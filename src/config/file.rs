@@ -91,10 +91,9 @@ pub struct ClassEntry {
     /// performed anew) or `loop` (the clock, round and round).
     pub play: Option<Spanned<String>>,
     /// Windows of phase or progression, 0 to 1, in which it may be left; at any time when not given.
-    #[serde(default)]
-    pub leave: Vec<[f64; 2]>,
+    pub leave: Option<Spanned<Vec<[f64; 2]>>>,
     /// Part of the phase advance that a limb may gain or lose against the body; 0.05 when not given.
-    pub limb_advance: Option<f64>,
+    pub limb_advance: Option<Spanned<f64>>,
     /// How parameters become weights.
     pub weights: Option<Spanned<String>>,
     /// Parameters beside amplitude and frequency.

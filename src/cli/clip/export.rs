@@ -18,8 +18,8 @@ pub(super) const EXAMPLES: &str = "Examples:
   handwave clip export fox_walk.json --mesh fox.glb --mesh-unit cm --out walk.glb
   handwave clip export 02_01.amc --out walk.bvh                     any motion that import reads
 
-.bvh holds skeletons. .csv is what import reads: joints in rad, or rotation vectors; metres, x forward,
-y left, z up. .glb and .gltf are glTF 2.0, metres, y up, faces z.";
+.bvh holds skeletons. .csv is what import reads: joints in rad, or rotation vectors; metres, x
+forward, y left, z up. .glb and .gltf are glTF 2.0, metres, y up, faces z.";
 
 /// A clip and where it goes.
 #[derive(Args, Debug)]

@@ -29,10 +29,11 @@ Formats, told from extension and content:
   .csv             t,<joint>,... in rad, with x,y,z,roll,pitch,yaw if the robot walks; of a skeleton
                    t,x,y,z,<joint>.rx,<joint>.ry,<joint>.rz,... with --skeleton FILE
 
-A clip is in metres and radians, x forward, y left, z up. A motion that says it loops becomes a cycle,
-any other a path, unless --kind tells; --start and --end then mark one cycle, of which the end is the
-start again. --cycle auto finds the cycle. The ends of a cycle are joined: what they differ by is spread
-over it. Legs that are found (of a robot with --urdf) become the segments of a cycle.";
+A clip is in metres and radians, x forward, y left, z up. A motion that says it loops becomes a
+cycle, any other a path, unless --kind tells; --start and --end then mark one cycle, of which
+the end is the start again. --cycle auto finds the cycle. The ends of a cycle are joined: what
+they differ by is spread over it. Legs that are found (of a robot with --urdf) become the
+segments of a cycle.";
 
 /// A motion and what to make of it.
 #[derive(Args, Debug)]

@@ -52,7 +52,7 @@ pub(super) fn graph_svg(title: &str, boxes: &[Box], arrows: &[Arrow]) -> String 
         0 | 1 => (0.0, 0.0),
         2 => (0.5 * (wide + 150.0), 0.0),
         _ => (
-            (wide + 90.0) / chord.max(0.5),
+            (wide + 150.0) / chord.max(0.5),
             (high + 90.0) / chord.max(0.5),
         ),
     };
@@ -130,14 +130,16 @@ fn draw_arrow(svg: &mut String, arrow: &Arrow, places: &[(f64, f64)], sizes: &[(
     );
     let from = border(*a, sizes[arrow.from], control);
     let to = border(*b, sizes[arrow.to], control);
+    // A third of the way along, for in the middle of the ring many arrows cross.
+    let [p, q, r] = [0.49, 0.42, 0.09];
     let top = (
-        0.25 * from.0 + 0.5 * control.0 + 0.25 * to.0 + 12.0 * side.0,
-        0.25 * from.1 + 0.5 * control.1 + 0.25 * to.1 + 12.0 * side.1,
+        p * from.0 + q * control.0 + r * to.0 + 4.0 * side.0,
+        p * from.1 + q * control.1 + r * to.1 + 4.0 * side.1,
     );
     let _ = writeln!(
         svg,
         "<path d=\"M{:.1} {:.1}Q{:.1} {:.1} {:.1} {:.1}\" fill=\"none\" stroke=\"#555\" stroke-width=\"1.8\" marker-end=\"url(#tip)\"/>\n\
-         <text x=\"{:.1}\" y=\"{:.1}\" font-size=\"12\" fill=\"#555\" text-anchor=\"middle\" dominant-baseline=\"middle\">{}</text>",
+         <text x=\"{:.1}\" y=\"{:.1}\" font-size=\"12\" fill=\"#555\" text-anchor=\"middle\" dominant-baseline=\"middle\" stroke=\"white\" stroke-width=\"5\" paint-order=\"stroke\">{}</text>",
         from.0,
         from.1,
         control.0,

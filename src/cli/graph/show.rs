@@ -6,6 +6,7 @@ use super::matrix::matrix_svg;
 use super::{load, make_folder, write};
 use crate::cli::{ExitStatus, Failure, say};
 use crate::config::Character;
+use crate::motion::class::Play;
 use crate::motion::clip::ClipKind;
 use std::path::Path;
 
@@ -79,22 +80,24 @@ fn lines(character: &Character, node: usize) -> Vec<String> {
     for example in class.examples() {
         let (amplitude, frequency_hz) = (example.parameters[0], example.parameters[1]);
         let name = &example.clip.name;
-        let mut line = match example.clip.kind {
-            ClipKind::Path => format!("{name}: a path, progression 0 to 1"),
-            ClipKind::Cycle if amplitude == 0.0 => format!("{name}: at rest"),
-            ClipKind::Cycle => format!("{name}: amplitude {amplitude}, {frequency_hz} Hz"),
-        };
-        for (name, value) in class
+        let further: String = (class
             .options
             .extra
             .iter()
-            .zip(&example.parameters.as_slice()[2..])
-        {
-            if *value != 0.0 {
-                line.push_str(&format!(", {name} {value}"));
+            .zip(example.parameters.as_slice().iter().skip(2)))
+        .filter(|(_, v)| **v != 0.0)
+        .map(|(name, v)| format!(", {name} {v}"))
+        .collect();
+        lines.push(match example.clip.kind {
+            ClipKind::Path if class.options.play == Play::Once => {
+                format!("{name}: a path, once, by the clock{further}")
             }
-        }
-        lines.push(line);
+            ClipKind::Path => format!("{name}: a path, progression 0 to 1{further}"),
+            ClipKind::Cycle if amplitude == 0.0 => format!("{name}: at rest{further}"),
+            ClipKind::Cycle => {
+                format!("{name}: amplitude {amplitude}, {frequency_hz} Hz{further}")
+            }
+        });
     }
     lines
 }

@@ -8,6 +8,15 @@ use std::fmt::Write;
 /// Servos that a line of 1 Mbaud serves 200 times a second with room to spare.
 const SERVOS_AT_ONE_MEGABAUD: usize = 14;
 
+/// The class that a channel drives.
+const SIT: &str = r#"
+# A channel in a gesture's place: 0 at the first value of its range, 1 at the second.
+[[class]]
+name = "sit"
+channel = { name = "z", range = [-0.03, -0.12] }   # the hand pushed away, m
+clip = [{ file = "clips/sit.json" }]
+"#;
+
 /// Baud rate at which all joints are served 200 times a second.
 pub(super) fn baud(walker: Walker<'_>) -> u32 {
     if walker.model.actuated.len() <= SERVOS_AT_ONE_MEGABAUD {
@@ -48,10 +57,32 @@ pub(super) fn config(
     let not_wired: Vec<String> = clips
         .iter()
         .map(|c| c.file.name.clone())
-        .filter(|n| n.contains("turn") || n == "sit")
+        .filter(|n| n.contains("turn"))
         .collect();
+    let mut steps = String::new();
+    for (side, at) in [
+        ("", ""),
+        ("_left", ", at = { turn = 1.0 }"),
+        ("_right", ", at = { turn = -1.0 }"),
+    ] {
+        for (gait, hz) in [(slow, slow_hz), (fast, fast_hz)] {
+            for (length, amplitude) in [("short", 0.5), ("long", 1.0)] {
+                let file = format!("clips/{gait}_{length}{side}.json");
+                let _ = writeln!(
+                    steps,
+                    "  {{ file = \"{file}\", amplitude = {amplitude:?}, frequency_hz = {hz:?}{at} }},"
+                );
+            }
+        }
+    }
+    let (sitting, sit) = if has("sit") {
+        (", a hand pushed away makes it sit", SIT)
+    } else {
+        ("", "")
+    };
     format!(
-        r#"# {name}: finger drumming makes it {slow} and {fast}, a splayed hand makes it {greeting}.
+        r#"# {name}: finger drumming makes it {slow} and {fast}, a turned hand turns it, a splayed hand makes it
+# {greeting}{sitting}.
 # Made by `handwave character new`; plays with no hardware. Paths are relative to this file, unknown keys
 # are errors. To change a clip, edit clips/NAME.toml and make it again:
 #   handwave clip gait --urdf {urdf} --gait clips/NAME.toml --out clips/NAME.json
@@ -65,23 +96,21 @@ source = "file:performances/drum_and_splay.jsonl"  # a recorded hand; `--input` 
 [[gesture]]
 file = "gestures/hand.toml"      # `drum` (cyclic) and `splay` (non-cyclic); `handwave gesture teach` shows your own
 
-# The gesture's amplitude and frequency choose the blend of clips, its phase drives the legs.
+# The gesture's amplitude and frequency choose the blend of clips, its phase drives the legs. The hand's yaw
+# against the reference, rad, turns the walk; `at` says where in a parameter a clip is played pure (0 when not said).
 [[class]]
 name = "locomotion"
 gesture = "drum"
+parameter = [{{ name = "turn", channel = "yaw", range = [-0.6, 0.6], dead_zone = 0.25 }}]
 clip = [
-  {{ file = "clips/stand.json", amplitude = 0.0 }},
-  {{ file = "clips/{slow}_short.json", amplitude = 0.5, frequency_hz = {slow_hz} }},
-  {{ file = "clips/{slow}_long.json", amplitude = 1.0, frequency_hz = {slow_hz} }},
-  {{ file = "clips/{fast}_short.json", amplitude = 0.5, frequency_hz = {fast_hz} }},
-  {{ file = "clips/{fast}_long.json", amplitude = 1.0, frequency_hz = {fast_hz} }},
-]
+  {{ file = "clips/stand.json", amplitude = 0.0 }},    # at rest, at any frequency
+{steps}]
 
 [[class]]
 name = "{greeting}"
 gesture = "splay"        # its progression, 0 to 1, is the way through the clip
 clip = [{{ file = "clips/{greeting_clip}.json" }}]
-
+{sit}
 [graph]
 start = "locomotion"     # played when nothing is performed
 

@@ -17,6 +17,8 @@ const FAST_HZ: f64 = 1.7;
 /// Share of the joints' speed and acceleration that a clip uses at its tempo; the rest is for blending
 /// and for catching up with the performer.
 const SHARE: f64 = 0.6;
+/// Stride of a curved gait over that of the straight one, and its turn over that of a turn in place.
+const CURVE: (f64, f64) = (0.75, 0.5);
 /// A pose or stride is never made smaller than this part.
 const LEAST: f64 = 0.15;
 
@@ -91,7 +93,18 @@ pub fn starter(walker: Walker<'_>, names: &StarterNames<'_>) -> Result<Starter, 
         let mut short = body.steps(name, "short", gait, hz, 0.5);
         short.stride_m = Some(0.5 * stride);
         short.step_height_m = Some(0.6 * lift);
-        clips.push(fitted(easy, |amount| Ok(scaled(&short, amount)))?);
+        let short = fitted(easy, |amount| Ok(scaled(&short, amount)))?;
+        for (side, sign) in [("left", 1.0), ("right", -1.0)] {
+            // A short step turns as far for its length as a long one: the same curve.
+            for (straight, turn_rad) in [(&short, 0.5 * body.turn_rad), (&long, body.turn_rad)] {
+                let mut curve = straight.description.clone();
+                curve.name = format!("{}_{side}", curve.name);
+                curve.stride_m = curve.stride_m.map(|m| CURVE.0 * m);
+                curve.turn_rad = sign * CURVE.1 * turn_rad;
+                clips.push(fitted(easy, |amount| Ok(scaled(&curve, amount)))?);
+            }
+        }
+        clips.push(short);
         clips.push(long);
         for (side, sign) in [("left", 1.0), ("right", -1.0)] {
             clips.push(fitted(easy, |amount| {
@@ -140,11 +153,12 @@ fn fitted(
     }
 }
 
-/// A gait with all its lengths times `amount`.
+/// A gait with all its lengths, and its turn, times `amount`.
 fn scaled(description: &GaitDescription, amount: f64) -> GaitDescription {
     let mut less = description.clone();
     less.stride_m = less.stride_m.map(|v| v * amount);
     less.step_height_m = less.step_height_m.map(|v| v * amount);
+    less.turn_rad *= amount;
     less
 }
 
@@ -214,7 +228,7 @@ impl Proportions {
             (
                 "heading",
                 BodyPose {
-                    yaw_rad: 0.22,
+                    yaw_rad: 0.16,
                     ..BodyPose::default()
                 },
             ),

@@ -233,7 +233,12 @@ fn limbs(findings: &Findings, window: &Window, x: impl Fn() -> Axis) -> Vec<Pane
         }
         let colours = ["blue", "vermilion", "green", "purple"];
         let legend: Vec<String> = (joints.iter().zip(colours))
-            .map(|(joint, colour)| format!("{joint} {colour}"))
+            .map(|(joint, colour)| {
+                // The panel is named by the limb; twice its name would not fit.
+                let short = joint.strip_prefix(limb.as_str());
+                let short = short.map_or(joint.as_str(), |rest| rest.trim_start_matches('_'));
+                format!("{} {colour}", if short.is_empty() { joint } else { short })
+            })
             .collect();
         panels.push(Panel {
             title: format!("{limb}: {}", legend.join(", ")),
