@@ -286,8 +286,8 @@ impl Character {
         let graph = Graph::new(classes.len(), *start, &edges, *options);
         let space = self.body.space.boxed();
         let mut animator = Animator::new(space, classes, graph, layers, &ranges);
-        if let (Some(search), Some(model)) = (&self.search, &self.model) {
-            let made = search.make(&self.classes, &self.graph.1, model);
+        if let Some(search) = &self.search {
+            let made = search.make(&self.classes, &self.graph.1, &self.body.space.shared());
             for (from, to, search) in made.map_err(|e| wrong("graph.search", None, e))? {
                 animator = animator.with_search(from, to, search);
             }

@@ -14,6 +14,7 @@ use super::range::{JointRange, Steepness};
 use super::smooth::Follower;
 use super::weights::{Parameters, Weights};
 use crate::body::PoseSpace;
+pub(super) use build::runs;
 pub use build::{ClassError, ClassOptions};
 use std::f64::consts::TAU;
 use std::ops::Range;

@@ -246,7 +246,7 @@ fn check_options(name: &str, kind: ClipKind, options: &ClassOptions) -> Result<(
 }
 
 /// Neighbouring coordinates of the same limb, as ranges.
-fn runs(limb_of: &[Option<usize>]) -> Vec<(Range<usize>, Option<usize>)> {
+pub(in crate::motion) fn runs(limb_of: &[Option<usize>]) -> Vec<(Range<usize>, Option<usize>)> {
     let mut runs: Vec<(Range<usize>, Option<usize>)> = Vec::new();
     for (i, limb) in limb_of.iter().enumerate() {
         match runs.last_mut() {
