@@ -206,9 +206,10 @@ fn written(character: &Character) -> Result<Option<(String, Vec<Example>)>, Stri
     let Ok((legs, facing)) = Leg::find_all_facing(model, None) else {
         return Ok(None);
     };
-    let (gait, of) = match legs.len() {
-        5.. => (GaitName::Wave, "wave"),
-        _ => (GaitName::Pace, "pace"),
+    // A wave swings one leg after the other, each in a small part of the cycle.
+    let (gait, of, tempi) = match legs.len() {
+        5.. => (GaitName::Wave, "wave", [("slow", 0.6), ("quick", 1.0)]),
+        _ => (GaitName::Pace, "pace", [("slow", 0.9), ("quick", 1.6)]),
     };
     let ranges: Vec<JointRange> = character
         .limits
@@ -226,7 +227,7 @@ fn written(character: &Character) -> Result<Option<(String, Vec<Example>)>, Stri
     };
     let mut examples = Vec::new();
     for (size, share) in [("short", 0.5), ("long", 1.0)] {
-        for (tempo, frequency_hz) in [("slow", 0.9), ("quick", 1.6)] {
+        for (tempo, frequency_hz) in tempi {
             let name = format!("{of}_{size}_{tempo}");
             let mut description = GaitDescription::preset(&name, gait);
             description.frequency_hz = Some(frequency_hz);

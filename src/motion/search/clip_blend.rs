@@ -2,9 +2,9 @@
 
 use super::class::SearchClass;
 use super::clips::{ClassSpec, FeatureError, Synthesis};
+use crate::body::PoseSpace;
 use crate::motion::class::{ClassError, Example, runs};
 use crate::motion::clip::{Clip, ClipKind};
-use crate::body::PoseSpace;
 use crate::motion::limbs::{Timelines, timelines};
 use crate::motion::weights::{Parameters, Weights};
 use std::f64::consts::TAU;
