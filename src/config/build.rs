@@ -121,7 +121,16 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     } = parts(&files, &file, &at)?;
     let ranges = joint_ranges(&body, &limits);
     let (mut gestures, paths, texts) = gesture_set(&files, &file, &at)?;
-    let classes = class_parts(&files, &file, &body, &joints, &limits, &gestures, &at)?;
+    let mut classes = class_parts(
+        &files,
+        &file,
+        &body,
+        model.as_ref(),
+        &joints,
+        &limits,
+        &gestures,
+        &at,
+    )?;
     if let (true, Some(map)) = (
         gestures.gestures.is_empty(),
         classes.iter().find_map(|c| c.map.as_ref()),
@@ -131,7 +140,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         gestures.global = map.spec.global.clone();
         gestures.reference = map.spec.reference.clone();
     }
-    for class in classes.iter().filter(|c| c.map.is_none()) {
+    for class in classes.iter_mut().filter(|c| c.map.is_none()) {
         for example in &class.examples {
             if let Some(problem) = outside(&example.clip, model.as_ref()) {
                 return Err(at.key(
@@ -140,13 +149,20 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
                 ));
             }
         }
-        MotionClass::new(
+        let built = MotionClass::new(
             &class.name,
             class.examples.clone(),
             ranges.clone(),
             class.options.clone(),
         )
         .map_err(|e| at.key("class.name", e))?;
+        let blending = built.blending(body.space.get(), &class.blend.spec);
+        class.blending = blending.map_err(|e| ConfigError {
+            file: file_name.clone(),
+            line: class.blend.line,
+            key: "class.blending".into(),
+            problem: e.to_string(),
+        })?;
     }
     let graph = graph_parts(&file, &classes, &at)?;
     let search = search_parts(&file, &classes, &at)?;
@@ -273,7 +289,7 @@ impl Character {
                 None => {
                     let (examples, options) = (c.examples.clone(), c.options.clone());
                     MotionClass::new(&c.name, examples, ranges.clone(), options)
-                        .map(Node::from)
+                        .map(|class| Node::from(class.blended(c.blending.clone())))
                         .map_err(|e| wrong("class", None, e.to_string()))
                 }
             })
