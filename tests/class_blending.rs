@@ -251,10 +251,6 @@ fn bad_values_are_refused_with_file_line_and_key() {
         "blending = \"non_linear\"\nends = [\"front_lef\"]",
         &["fox.toml:", "class.ends", "front_left"],
     );
-    fox(
-        "blending = \"hybrid\"\ntolerance_m = 0.0001",
-        &["fox.toml:", "class.blending", "is not reached"],
-    );
     check(
         "quadruped.toml",
         class,
