@@ -6,8 +6,8 @@ use super::file::ClassEntry;
 use crate::base::suggest::hint;
 use crate::body::blend::BlendingKind;
 use crate::body::blend::NonLinear;
-use crate::body::{Feet, RobotEnds};
-use crate::motion::class::BlendSpec;
+use crate::body::{Blending, Feet, PoseSpace, RobotEnds};
+use crate::motion::class::{BlendSpec, MotionClass};
 use crate::robot::RobotModel;
 use crate::robot::ik::ChainIk;
 use std::sync::Arc;
@@ -17,6 +17,24 @@ use std::sync::Arc;
 pub(super) struct BlendParts {
     pub(super) spec: BlendSpec,
     pub(super) line: Option<usize>,
+}
+
+impl BlendParts {
+    /// What they come to for the clips of `class`.
+    pub(super) fn of(
+        &self,
+        class: &MotionClass,
+        space: &dyn PoseSpace,
+        file: &str,
+    ) -> Result<Blending, ConfigError> {
+        let blending = class.blending(space, &self.spec);
+        blending.map_err(|e| ConfigError {
+            file: file.into(),
+            line: self.line,
+            key: "class.blending".into(),
+            problem: e.to_string(),
+        })
+    }
 }
 
 /// Distance of `hybrid` to `non_linear` when none is given, metres.

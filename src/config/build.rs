@@ -156,13 +156,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
             class.options.clone(),
         )
         .map_err(|e| at.key("class.name", e))?;
-        let blending = built.blending(body.space.get(), &class.blend.spec);
-        class.blending = blending.map_err(|e| ConfigError {
-            file: file_name.clone(),
-            line: class.blend.line,
-            key: "class.blending".into(),
-            problem: e.to_string(),
-        })?;
+        class.blending = class.blend.of(&built, body.space.get(), &file_name)?;
     }
     let graph = graph_parts(&file, &classes, &at)?;
     let search = search_parts(&file, &classes, &at)?;
