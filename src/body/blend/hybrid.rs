@@ -10,6 +10,9 @@ use crate::body::{Feet, PoseSpace};
 use std::collections::HashMap;
 use std::ops::Range;
 
+/// Gives the example poses of a frame, by its number and the weights.
+type Sample<'a> = dyn FnMut(usize, &[f64], &mut [f64]) + 'a;
+
 /// How far the weight space is cut.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub enum Refine {
@@ -103,7 +106,7 @@ impl Hybrid {
         [frames, poses]: [usize; 2],
         periodic: bool,
         refine: Refine,
-        sample: &mut dyn FnMut(usize, &[f64], &mut [f64]),
+        sample: &mut Sample<'_>,
     ) -> Self {
         let mut hybrid = Self {
             cells: Cells::new(poses),
@@ -248,7 +251,7 @@ struct Builder<'a> {
     frames: usize,
     /// Room for the poses of a frame.
     frame: Vec<f64>,
-    sample: &'a mut dyn FnMut(usize, &[f64], &mut [f64]),
+    sample: &'a mut Sample<'a>,
     /// Differences may be dropped that move nothing farther than this together, metres.
     drop_m: f64,
     /// Worst distance of every tested weight, by its bits. A cell's weights are tested again only when it is new.
