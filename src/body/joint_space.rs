@@ -155,6 +155,14 @@ impl PoseSpace for JointSpace {
             *out = lever * q;
         }
     }
+
+    /// The longest lever arm of a joint.
+    fn size_m(&self) -> f64 {
+        let joints = self.parts.iter().filter(|p| p.coordinates.len() == 1);
+        joints
+            .map(|p| self.levers[p.coordinates.start])
+            .fold(0.0, f64::max)
+    }
 }
 
 #[cfg(test)]

@@ -99,6 +99,14 @@ pub trait PoseSpace: Send + Sync {
     /// Euclidean features of a pose in the travelling frame, metres.
     fn embed(&self, pose: &[f64], out: &mut [f64]);
 
+    /// Points, joints or lever arms that a distance of embeddings is the mean over.
+    fn points(&self) -> usize {
+        self.features()
+    }
+
+    /// A length of the body that makes a turn of its root a length, metres.
+    fn size_m(&self) -> f64;
+
     /// Root mean square distance of two poses' embeddings, metres. Allocates: for offline use.
     fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let mut embedded = vec![0.0; 2 * self.features()];

@@ -64,6 +64,19 @@ impl SkeletonEnds {
     }
 }
 
+impl SkeletonEnds {
+    /// The limbs called `names` alone.
+    #[must_use]
+    pub fn only(&self, names: &[&str]) -> Self {
+        let mut limbs = self.limbs.clone();
+        limbs.retain(|l| names.contains(&l.name.as_str()));
+        Self {
+            skeleton: Arc::clone(&self.skeleton),
+            limbs,
+        }
+    }
+}
+
 impl Feet for SkeletonEnds {
     fn count(&self) -> usize {
         self.limbs.len()

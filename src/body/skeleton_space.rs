@@ -185,4 +185,14 @@ impl PoseSpace for SkeletonSpace {
             out[3 * joint..3 * joint + 3].copy_from_slice(at.coords.as_slice());
         }
     }
+
+    fn points(&self) -> usize {
+        self.skeleton.len()
+    }
+
+    /// How high it stands at rest.
+    fn size_m(&self) -> f64 {
+        let height = |joint| self.skeleton.position(&self.rest, joint).z;
+        (0..self.skeleton.len()).map(height).fold(0.0, f64::max)
+    }
 }

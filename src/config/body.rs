@@ -7,6 +7,7 @@ use super::files::Files;
 use crate::body::{Feet, JointSpace, PoseSpace, RobotFeet, SkeletonSpace};
 use crate::motion::clip::{Clip, ClipError, ClipFile, ClipKind};
 use crate::robot::{Leg, RobotModel};
+use std::sync::Arc;
 
 /// A robot or an avatar as a pose space; with legs it has feet to be pinned.
 #[derive(Clone, Debug)]
@@ -34,6 +35,14 @@ impl BodySpace {
         match self {
             BodySpace::Joints(space) => space,
             BodySpace::Skeleton(space) => space,
+        }
+    }
+
+    /// One to be shared.
+    pub fn shared(&self) -> Arc<dyn PoseSpace> {
+        match self {
+            BodySpace::Joints(space) => Arc::new(space.clone()),
+            BodySpace::Skeleton(space) => Arc::new(space.clone()),
         }
     }
 

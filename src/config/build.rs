@@ -121,7 +121,16 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     } = parts(&files, &file, &at)?;
     let ranges = joint_ranges(&body, &limits);
     let (mut gestures, paths, texts) = gesture_set(&files, &file, &at)?;
-    let classes = class_parts(&files, &file, &body, &joints, &limits, &gestures, &at)?;
+    let mut classes = class_parts(
+        &files,
+        &file,
+        &body,
+        model.as_ref(),
+        &joints,
+        &limits,
+        &gestures,
+        &at,
+    )?;
     if let (true, Some(map)) = (
         gestures.gestures.is_empty(),
         classes.iter().find_map(|c| c.map.as_ref()),
@@ -131,7 +140,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         gestures.global = map.spec.global.clone();
         gestures.reference = map.spec.reference.clone();
     }
-    for class in classes.iter().filter(|c| c.map.is_none()) {
+    for class in classes.iter_mut().filter(|c| c.map.is_none()) {
         for example in &class.examples {
             if let Some(problem) = outside(&example.clip, model.as_ref()) {
                 return Err(at.key(
@@ -140,13 +149,14 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
                 ));
             }
         }
-        MotionClass::new(
+        let built = MotionClass::new(
             &class.name,
             class.examples.clone(),
             ranges.clone(),
             class.options.clone(),
         )
         .map_err(|e| at.key("class.name", e))?;
+        class.blending = class.blend.of(&built, body.space.get(), &file_name)?;
     }
     let graph = graph_parts(&file, &classes, &at)?;
     let search = search_parts(&file, &classes, &at)?;
@@ -273,7 +283,7 @@ impl Character {
                 None => {
                     let (examples, options) = (c.examples.clone(), c.options.clone());
                     MotionClass::new(&c.name, examples, ranges.clone(), options)
-                        .map(Node::from)
+                        .map(|class| Node::from(class.blended(c.blending.clone())))
                         .map_err(|e| wrong("class", None, e.to_string()))
                 }
             })
@@ -286,8 +296,8 @@ impl Character {
         let graph = Graph::new(classes.len(), *start, &edges, *options);
         let space = self.body.space.boxed();
         let mut animator = Animator::new(space, classes, graph, layers, &ranges);
-        if let (Some(search), Some(model)) = (&self.search, &self.model) {
-            let made = search.make(&self.classes, &self.graph.1, model);
+        if let Some(search) = &self.search {
+            let made = search.make(&self.classes, &self.graph.1, &self.body.space.shared());
             for (from, to, search) in made.map_err(|e| wrong("graph.search", None, e))? {
                 animator = animator.with_search(from, to, search);
             }

@@ -1,5 +1,6 @@
 //! Classes of a configuration, checked and resolved to indices.
 
+use super::blending::{BlendParts, blend_parts};
 use super::body::Body;
 use super::error::{ConfigError, Pointer};
 use super::file::{CharacterFile, ClassEntry, ClipEntry};
@@ -8,13 +9,14 @@ use super::layer::{channel_index, channel_map};
 use super::map::{MapParts, load_map};
 use super::motion::clip;
 use crate::base::suggest::hint;
+use crate::body::Blending;
 use crate::gesture::{FrontEnd, GestureKind, GestureSet};
 use crate::motion::class::{ClassOptions, EXTRA, Example, Play};
 use crate::motion::clip::ClipKind;
 use crate::motion::layer::ChannelMap;
 use crate::motion::node::ClassInput;
 use crate::motion::weights::{Parameters, WeightKind};
-use crate::robot::JointEnvelope;
+use crate::robot::{JointEnvelope, RobotModel};
 
 /// A class before it is built.
 #[derive(Clone, Debug)]
@@ -34,6 +36,9 @@ pub struct ClassParts {
     /// Channels that drive its parameters beside amplitude and frequency.
     pub(super) extra: Vec<ChannelParts>,
     pub(super) examples: Vec<Example>,
+    /// How poses are to be blended, and what that comes to for the clips.
+    pub(super) blend: BlendParts,
+    pub(super) blending: Blending,
 }
 
 /// What a channel drives, not yet bound to it.
@@ -118,10 +123,12 @@ impl ClassParts {
 }
 
 /// Classes in node order, with their clips.
+#[allow(clippy::too_many_arguments, reason = "what a class is checked against")]
 pub(super) fn class_parts(
     files: &Files,
     file: &CharacterFile,
     body: &Body,
+    model: Option<&RobotModel>,
     joints: &[String],
     limits: &[JointEnvelope],
     gestures: &GestureSet,
@@ -146,6 +153,10 @@ pub(super) fn class_parts(
         if let (Some(path), Some(_)) = (&class.map, &body.avatar) {
             let problem = "a pose map drives a robot; a class of an avatar has clips";
             return Err(at.at(path.span(), "class.map", problem));
+        }
+        if let (Some(blending), Some(_)) = (&class.blending, &class.map) {
+            let problem = "a pose map has no clips to blend";
+            return Err(at.at(blending.span(), "class.blending", problem));
         }
         if let Some(path) = &class.map {
             parts.push(direct_parts(
@@ -257,6 +268,8 @@ pub(super) fn class_parts(
             channel,
             extra,
             examples,
+            blend: blend_parts(class, body, model, at)?,
+            blending: Blending::Linear,
         });
     }
     Ok(parts)
@@ -462,5 +475,7 @@ fn direct_parts(
         channel: None,
         extra: Vec::new(),
         examples: Vec::new(),
+        blend: BlendParts::default(),
+        blending: Blending::Linear,
     })
 }

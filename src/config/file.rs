@@ -96,6 +96,13 @@ pub struct ClassEntry {
     pub limb_advance: Option<Spanned<f64>>,
     /// How parameters become weights.
     pub weights: Option<Spanned<String>>,
+    /// How poses are blended: `linear` (default), `non_linear` or `hybrid`; for avatars and arms.
+    pub blending: Option<Spanned<String>>,
+    /// With `hybrid`: how far it may be from `non_linear`, metres (0.002).
+    pub tolerance_m: Option<Spanned<f64>>,
+    /// End links of an arm (limbs of an avatar) that stay on the blend of their own places; default: an arm's
+    /// leaf links.
+    pub ends: Option<Vec<Spanned<String>>>,
     /// Parameters beside amplitude and frequency.
     #[serde(default)]
     pub parameter: Vec<ParameterEntry>,

@@ -4,6 +4,7 @@
 //! embedded in the program), [`build`] checks it and makes the parts, [`map`] learns the pose maps it names, [`error`] tells what is wrong.
 
 mod avatar;
+mod blending;
 pub mod body;
 pub mod build;
 mod channel;

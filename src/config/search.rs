@@ -3,13 +3,13 @@
 use super::class::ClassParts;
 use super::error::{ConfigError, Pointer};
 use super::file::CharacterFile;
+use crate::body::PoseSpace;
 use crate::motion::class::Play;
 use crate::motion::clip::ClipKind;
 use crate::motion::edge::EdgeSearch;
 use crate::motion::search::calibrate::random_requests;
-use crate::motion::search::robot::{ClipBlend, lever_arms};
+use crate::motion::search::clip_blend::ClipBlend;
 use crate::motion::search::{DistanceTables, Search, SearchClass, SearchOptions, calibrate};
-use crate::robot::RobotModel;
 use std::sync::Arc;
 
 /// How transitions are chosen, checked.
@@ -24,8 +24,6 @@ pub(super) struct SearchParts {
 
 /// Frames per clip.
 const FRAMES: usize = 40;
-/// References per parameter: rest, the smallest and the largest motion.
-const STEPS: usize = 2;
 /// Random requests that kappa is found from, and their seed.
 const REQUESTS: (usize, u64) = (20, 7);
 /// A path may be entered up to here: what it shows must not be lost.
@@ -116,10 +114,8 @@ impl SearchParts {
         &self,
         classes: &[ClassParts],
         edges: &[(usize, usize)],
-        model: &RobotModel,
+        space: &Arc<dyn PoseSpace>,
     ) -> Result<Vec<(usize, usize, EdgeSearch)>, String> {
-        let levers = lever_arms(model);
-        let height_m = levers.iter().copied().fold(0.0, f64::max);
         let mut made: Vec<Option<(ClipBlend, Arc<SearchClass>)>> = Vec::new();
         let wanted = |from: usize, to: usize| {
             (self.edges.as_ref()).is_none_or(|list| list.contains(&(from, to)))
@@ -131,11 +127,11 @@ impl SearchParts {
                 .any(|(a, b)| (*a == node || *b == node) && wanted(*a, *b));
             // A class in which nothing moves, or a pose map, has nothing to search.
             let blend = used
-                .then(|| ClipBlend::new(&class.name, class.examples(), &levers).ok())
+                .then(|| ClipBlend::new(&class.name, class.examples(), space).ok())
                 .flatten();
             made.push(match blend {
                 Some(blend) => {
-                    let search = blend.search_class(FRAMES, STEPS, height_m);
+                    let search = blend.search_class(FRAMES, blend.steps());
                     Some((blend, Arc::new(search.map_err(|e| e.to_string())?)))
                 }
                 None => None,

@@ -4,6 +4,7 @@
 //! the gesture's; every limb keeps its own timeline (eq. 9.7). A path class is driven by progression,
 //! or plays by the clock once it is asked for.
 
+mod blending;
 mod build;
 mod cycle;
 mod path;
@@ -14,6 +15,9 @@ use super::range::{JointRange, Steepness};
 use super::smooth::Follower;
 use super::weights::{Parameters, Weights};
 use crate::body::PoseSpace;
+use crate::body::blend::Blending;
+pub use blending::{BlendSpec, MOST_HYBRID_CLIPS};
+pub(super) use build::runs;
 pub use build::{ClassError, ClassOptions};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -97,6 +101,8 @@ pub struct MotionClass {
     state: State,
     /// The way to the exit of a transition that was chosen, while it is followed.
     route: Route,
+    /// How the clips' poses become one.
+    blending: Blending,
     /// The class is active or being entered.
     shown: bool,
     // Work space, so that a step allocates nothing.
@@ -402,7 +408,13 @@ impl MotionClass {
 
     /// Samples every example at its limbs' phases and blends them.
     fn sample(&mut self, space: &dyn PoseSpace, phase: f64, out: &mut [f64]) {
-        let len = out.len();
+        self.sample_clips(phase, out.len());
+        self.blending
+            .blend(space, phase / TAU, &self.sampled, &self.weights, out);
+    }
+
+    /// Samples every example that has a weight at its limbs' phases.
+    fn sample_clips(&mut self, phase: f64, len: usize) {
         for e in 0..self.examples.len() {
             if self.weights[e] == 0.0 {
                 continue;
@@ -414,7 +426,6 @@ impl MotionClass {
                 clip.sample_range(u, run.clone(), &mut self.sampled[into]);
             }
         }
-        space.blend(&self.sampled, &self.weights, out);
     }
 
     /// Where the phase of the last sample is, for contacts.

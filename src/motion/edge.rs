@@ -1,6 +1,6 @@
 //! Transitions chosen at run time: when to leave a class and where to enter the next, by likeness and latency.
 
-use super::search::robot::ClipBlend;
+use super::search::clip_blend::ClipBlend;
 use super::search::{MAX_PARAMETERS, NoTransition, Search, State, Target};
 use super::weights::Parameters;
 

@@ -10,6 +10,9 @@ use crate::body::{Feet, PoseSpace};
 use std::collections::HashMap;
 use std::ops::Range;
 
+/// Gives the example poses of a frame, by its number and the weights.
+type Sample<'a> = dyn FnMut(usize, &[f64], &mut [f64]) + 'a;
+
 /// How far the weight space is cut.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub enum Refine {
@@ -89,10 +92,26 @@ impl Hybrid {
         refine: Refine,
     ) -> Self {
         let poses = frames.first().map_or(0, |f| f.len() / space.len().max(1));
+        let size = [frames.len(), poses];
+        Self::sampled(space, mean, size, periodic, refine, &mut |k, _, out| {
+            out.copy_from_slice(&frames[k]);
+        })
+    }
+
+    /// The same for example poses that depend on the weights, as limbs with timelines of their own do.
+    /// `size`: frames, and poses in each; `poses(k, weights, out)` gives those of frame `k`.
+    pub fn sampled(
+        space: &dyn PoseSpace,
+        mean: &NonLinear,
+        [frames, poses]: [usize; 2],
+        periodic: bool,
+        refine: Refine,
+        sample: &mut Sample<'_>,
+    ) -> Self {
         let mut hybrid = Self {
             cells: Cells::new(poses),
             tables: vec![Table::default(); poses],
-            frames: frames.len(),
+            frames,
             periodic,
             report: HybridReport::default(),
             corners: vec![0; poses],
@@ -103,6 +122,8 @@ impl Hybrid {
             space,
             mean: mean.clone(),
             frames,
+            frame: vec![0.0; poses * space.len()],
+            sample,
             drop_m: 0.0,
             tested: HashMap::new(),
         };
@@ -227,7 +248,10 @@ fn around(u: f64, frames: usize, periodic: bool) -> [(usize, f64); 4] {
 struct Builder<'a> {
     space: &'a dyn PoseSpace,
     mean: NonLinear,
-    frames: &'a [Vec<f64>],
+    frames: usize,
+    /// Room for the poses of a frame.
+    frame: Vec<f64>,
+    sample: &'a mut Sample<'a>,
     /// Differences may be dropped that move nothing farther than this together, metres.
     drop_m: f64,
     /// Worst distance of every tested weight, by its bits. A cell's weights are tested again only when it is new.
@@ -276,14 +300,11 @@ impl Builder<'_> {
         let tangent = space.tangent_len();
         let mut linear = vec![0.0; space.len()];
         let mut correct = linear.clone();
-        let mut rows = vec![0.0; self.frames.len() * tangent];
-        for (frame, row) in self
-            .frames
-            .iter()
-            .zip(rows.chunks_exact_mut(tangent.max(1)))
-        {
-            space.blend(frame, weights, &mut linear);
-            self.mean.blend(space, frame, weights, &mut correct);
+        let mut rows = vec![0.0; self.frames * tangent];
+        for (k, row) in rows.chunks_exact_mut(tangent.max(1)).enumerate() {
+            (self.sample)(k, weights, &mut self.frame);
+            space.blend(&self.frame, weights, &mut linear);
+            self.mean.blend(space, &self.frame, weights, &mut correct);
             space.diff(&linear, &correct, row);
         }
         // How far each part's difference moves anything, in the frame where it is largest.
@@ -300,7 +321,8 @@ impl Builder<'_> {
             if largest.0 <= 1e-24 {
                 continue;
             }
-            space.blend(&self.frames[largest.1], weights, &mut linear);
+            (self.sample)(largest.1, weights, &mut self.frame);
+            space.blend(&self.frame, weights, &mut linear);
             let mut only = vec![0.0; tangent];
             only[range.clone()].copy_from_slice(&rows[largest.1 * tangent..][range.clone()]);
             correct.copy_from_slice(&linear);
@@ -361,11 +383,13 @@ impl Builder<'_> {
         let mut quick = correct.clone();
         let mut worst = 0.0_f64;
         let places = if hybrid.periodic {
-            self.frames.len()
+            self.frames
         } else {
-            self.frames.len().max(2) - 1
+            self.frames.max(2) - 1
         };
-        for (k, frame) in self.frames.iter().enumerate() {
+        for k in 0..self.frames {
+            (self.sample)(k, weights, &mut self.frame);
+            let frame = &self.frame;
             self.mean.blend(self.space, frame, weights, &mut correct);
             let u = k as f64 / places as f64;
             hybrid.blend(self.space, u, frame, weights, &mut quick);

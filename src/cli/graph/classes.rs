@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::config::Character;
-use crate::motion::search::robot::{ClipBlend, lever_arms};
+use crate::motion::search::clip_blend::ClipBlend;
 use crate::motion::search::{DistanceTables, SearchClass};
 use std::sync::Arc;
 
@@ -14,27 +14,21 @@ pub(super) fn classes(
     character: &Character,
     frames: usize,
 ) -> Result<Vec<Option<Arc<SearchClass>>>, Failure> {
-    let levers = lever_arms(character.robot().map_err(Failure::input)?);
+    let space = character.body.space.shared();
     let mut made = Vec::new();
     for parts in &character.classes {
         if parts.map.is_some() {
             made.push(None);
             continue;
         }
-        let blend = ClipBlend::new(&parts.name, parts.examples(), &levers)
+        let blend = ClipBlend::new(&parts.name, parts.examples(), &space)
             .map_err(|e| Failure::input(format!("{}: {e}", character.config_name)))?;
-        // Two steps: rest, the smallest and the largest motion are references.
         let class = blend
-            .search_class(frames, 2, height_m(&levers))
+            .search_class(frames, blend.steps())
             .map_err(|e| Failure::input(format!("{}: {e}", character.config_name)))?;
         made.push(Some(Arc::new(class)));
     }
     Ok(made)
-}
-
-/// The body's size for turns of the root: its longest lever arm.
-pub(super) fn height_m(levers: &[f64]) -> f64 {
-    levers.iter().copied().fold(0.0, f64::max)
 }
 
 /// The most similar pair of poses of an edge.
@@ -45,7 +39,7 @@ pub(super) struct BestPair {
     pub(super) entry: (String, f64),
     /// 0..1.
     pub(super) similarity: f64,
-    /// Root mean square over joints, mm.
+    /// Root mean square over the body's points, mm.
     pub(super) distance_mm: f64,
     /// Distance of the least similar pair, mm.
     pub(super) largest_mm: f64,

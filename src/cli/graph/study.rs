@@ -1,6 +1,6 @@
 //! `handwave graph study`: online transition search against stored transitions, cost, latency and time.
 
-use super::classes::{FRAMES, height_m};
+use super::classes::FRAMES;
 use super::{load, make_folder, write};
 use crate::cli::{ExitStatus, Failure, say, warn};
 use crate::config::Character;
@@ -10,7 +10,7 @@ use crate::motion::clip::ClipKind;
 use crate::motion::gait::{GaitDescription, GaitName};
 use crate::motion::gait_frames::{Walker, author};
 use crate::motion::range::JointRange;
-use crate::motion::search::robot::{ClipBlend, lever_arms};
+use crate::motion::search::clip_blend::ClipBlend;
 use crate::motion::search::study::{MethodRow, StudyOptions, StudyResult, study as run_study};
 use crate::motion::search::{SearchClass, SearchOptions};
 use crate::robot::Leg;
@@ -26,7 +26,7 @@ pub(super) const EXAMPLES: &str = "Examples:
   handwave graph study configs/quadruped.toml --requests 50 --seed 7 --json
 
 From the start class's clips to those of another class: the first one with an edge from it whose clips repeat,
-or, on a robot with legs, a pace written for it. --parameters 1: tempo; 2: size and tempo; 3: also how deep the
+or, on a robot with legs, a gait written for it (a pace; with six legs a wave), or else the first class of clips. --parameters 1: tempo; 2: size and tempo; 3: also how deep the
 body crouches (the layer of that name). The same random requests (present state, wished state) go to all methods:
 online-N searches trellises of depth N, stored-N has the N best transition points fixed beforehand,
 exhaustive-10 visits every pair of nodes of depth 10. Columns: mean cost (E_S + lambda E_L), its part for
@@ -134,11 +134,14 @@ fn pair(
         .find(|class| repeats(class.examples()));
     let (name, examples) = match other {
         Some(class) => (class.name.clone(), class.examples().to_vec()),
-        None => ("pace".to_owned(), pace(character).map_err(bad)?),
+        None => match written(character).map_err(bad)? {
+            Some(gait) => gait,
+            None => shown(character).map_err(bad)?,
+        },
     };
-    let levers = lever_arms(character.robot().map_err(Failure::input)?);
-    let made = |name: &str, examples: &[Example]| {
-        let mut blend = ClipBlend::new(name, examples, &levers)
+    let space = character.body.space.shared();
+    let made = |name: &str, examples: &[Example], fewer: bool| {
+        let mut blend = ClipBlend::new(name, examples, &space)
             .map_err(|e| bad(e.to_string()))?
             .moving();
         if parameters < 2 {
@@ -153,7 +156,7 @@ fn pair(
             })?;
             blend = blend.with_added(crouch.clone());
         }
-        if blend.parameters() != parameters {
+        if blend.parameters() > parameters || (blend.parameters() < parameters && !fewer) {
             return Err(bad(format!(
                 "class {name} has {} parameter(s) ({}), --parameters asks for {parameters}; give it clips of more than one amplitude and frequency_hz",
                 blend.parameters(),
@@ -166,22 +169,48 @@ fn pair(
             blend.parameter_names().join(", ")
         ));
         // In-between references where the blend bends most; with three parameters the corners alone.
-        let steps = [4, 2, 1][parameters - 1];
-        let class = blend.search_class(FRAMES, steps, height_m(&levers));
+        let steps = [4, 2, 1][parameters.clamp(1, 3) - 1];
+        let class = blend.search_class(FRAMES, steps);
         class.map(Arc::new).map_err(|e| bad(e.to_string()))
     };
-    Ok((made(&from.name, from.examples())?, made(&name, &examples)?))
+    // A path that is entered need not have the parameters of what leads to it.
+    let entered = !repeats(&examples);
+    Ok((
+        made(&from.name, from.examples(), false)?,
+        made(&name, &examples, entered)?,
+    ))
 }
 
-/// A pace for the character's legs: short and long, slow and quick.
-fn pace(character: &Character) -> Result<Vec<Example>, String> {
-    let no_legs = |e| {
-        format!(
-            "no second class whose clips repeat, and no legs to write a gait for ({e}); add such a class and an edge to it"
-        )
+/// The first class of clips that the start class leads to.
+fn shown(character: &Character) -> Result<(String, Vec<Example>), String> {
+    let (start, edges) = character.graph();
+    let led_to = edges.iter().filter(|(from, _)| *from == start);
+    led_to
+        .map(|(_, to)| &character.classes[*to])
+        .find(|class| class.map.is_none())
+        .map(|class| (class.name.clone(), class.examples().to_vec()))
+        .ok_or_else(|| {
+            format!(
+                "the study needs a second class of clips, and no edge leads from the start class {} to one; no gait can be written for a body without legs of its own: add a class and an edge to it",
+                character.classes[start].name
+            )
+        })
+}
+
+/// A gait for the legs of a robot, short and long, slow and quick: a pace for four, a wave for more. `None`
+/// without legs.
+fn written(character: &Character) -> Result<Option<(String, Vec<Example>)>, String> {
+    let Some(model) = &character.model else {
+        return Ok(None);
     };
-    let model = character.robot().map_err(|e| e.to_string())?;
-    let (legs, facing) = Leg::find_all_facing(model, None).map_err(|e| no_legs(e.to_string()))?;
+    let Ok((legs, facing)) = Leg::find_all_facing(model, None) else {
+        return Ok(None);
+    };
+    // A wave swings one leg after the other, each in a small part of the cycle.
+    let (gait, of, tempi) = match legs.len() {
+        5.. => (GaitName::Wave, "wave", [("slow", 0.6), ("quick", 1.0)]),
+        _ => (GaitName::Pace, "pace", [("slow", 0.9), ("quick", 1.6)]),
+    };
     let ranges: Vec<JointRange> = character
         .limits
         .iter()
@@ -198,25 +227,22 @@ fn pace(character: &Character) -> Result<Vec<Example>, String> {
     };
     let mut examples = Vec::new();
     for (size, share) in [("short", 0.5), ("long", 1.0)] {
-        for (tempo, frequency_hz) in [("slow", 0.9), ("quick", 1.6)] {
-            let name = format!("pace_{size}_{tempo}");
-            let mut description = GaitDescription::preset(&name, GaitName::Pace);
+        for (tempo, frequency_hz) in tempi {
+            let name = format!("{of}_{size}_{tempo}");
+            let mut description = GaitDescription::preset(&name, gait);
             description.frequency_hz = Some(frequency_hz);
             let full = 0.25 * legs.first().map_or(0.3, |l| l.length(model));
             description.stride_m = Some(share * full);
             description.step_height_m = Some(0.3 * share * full);
             let authored = author(&description, walker, false).map_err(|e| e.to_string())?;
-            let clip = authored
-                .file
-                .for_body(&character.joints)
-                .map_err(|e| e.to_string())?;
+            let clip = (character.body.clip(&authored.file)).map_err(|e| e.to_string())?;
             examples.push(Example {
                 clip,
                 parameters: [share, frequency_hz].into(),
             });
         }
     }
-    Ok(examples)
+    Ok(Some((of.to_owned(), examples)))
 }
 
 fn table(rows: &[MethodRow]) -> String {

@@ -1,6 +1,7 @@
 //! Building a class: kinds checked, weights fitted, limbs and contacts brought together.
 
 use super::{Contact, Example, MotionClass, Play, Route, State};
+use crate::body::Blending;
 use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::limbs::timelines;
 use crate::motion::range::{JointRange, Steepness};
@@ -68,6 +69,32 @@ pub enum ClassError {
         class: String,
         /// What is wrong with the parameters.
         source: WeightsError,
+    },
+    /// More clips than a table is made for.
+    #[error(
+        "class {class}: blending = \"hybrid\" is for at most {most} clips, and there are {found}; take \"non_linear\", or make two classes of it"
+    )]
+    HybridClips {
+        /// Class name.
+        class: String,
+        /// Clips given.
+        found: usize,
+        /// Clips allowed.
+        most: usize,
+    },
+    /// A table that stays too coarse.
+    #[error(
+        "class {class}: blending = \"hybrid\": tolerance_m = {asked_m} is not reached, {references} references leave {worst_m:.4} m; ask for more, or take \"non_linear\""
+    )]
+    HybridTolerance {
+        /// Class name.
+        class: String,
+        /// Asked for, metres.
+        asked_m: f64,
+        /// Largest distance to the correct blend, metres.
+        worst_m: f64,
+        /// References that were made.
+        references: usize,
     },
     /// Limbs differ between clips.
     #[error(
@@ -198,6 +225,7 @@ impl MotionClass {
                 points: Vec::with_capacity(Route::MOST),
                 at_s: 0.0,
             },
+            blending: Blending::Linear,
             shown: false,
             examples,
         })
@@ -247,7 +275,7 @@ fn check_options(name: &str, kind: ClipKind, options: &ClassOptions) -> Result<(
 }
 
 /// Neighbouring coordinates of the same limb, as ranges.
-fn runs(limb_of: &[Option<usize>]) -> Vec<(Range<usize>, Option<usize>)> {
+pub(in crate::motion) fn runs(limb_of: &[Option<usize>]) -> Vec<(Range<usize>, Option<usize>)> {
     let mut runs: Vec<(Range<usize>, Option<usize>)> = Vec::new();
     for (i, limb) in limb_of.iter().enumerate() {
         match runs.last_mut() {

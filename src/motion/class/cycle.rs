@@ -153,7 +153,7 @@ impl MotionClass {
     }
 
     /// Moves limb timelines towards the blend of the clips' offsets, at most 5 % of the advance.
-    fn shift_limbs(&mut self, advance: f64, at_rest: bool) {
+    pub(super) fn shift_limbs(&mut self, advance: f64, at_rest: bool) {
         let bound = self.options.limb_advance * advance.abs();
         for limb in 0..self.state.limb_shift.len() {
             let mut moving = 0.0;

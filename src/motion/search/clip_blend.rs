@@ -1,20 +1,18 @@
-//! Classes of a robot's clips for the search: joint positions as lengths, and the animator's blend.
+//! Classes of clips for the search: poses of any body as lengths, blended as the animator blends them.
 
 use super::class::SearchClass;
 use super::clips::{ClassSpec, FeatureError, Synthesis};
-use crate::motion::class::{ClassError, Example};
+use crate::body::PoseSpace;
+use crate::motion::class::{ClassError, Example, runs};
 use crate::motion::clip::{Clip, ClipKind};
 use crate::motion::limbs::{Timelines, timelines};
 use crate::motion::weights::{Parameters, Weights};
-use crate::robot::RobotModel;
-use crate::robot::model::JointKind;
-use nalgebra::Vector3;
 use std::f64::consts::TAU;
+use std::ops::Range;
+use std::sync::Arc;
 
-/// Seconds from the beginning to the end of a path, which itself has no duration.
+/// Seconds from the beginning to the end of a path that does not say how long it takes, as it is played.
 pub const PATH_S: f64 = 1.0;
-/// Lever arm of a joint that moves no other link's origin, metres.
-const LEAST_LEVER_M: f64 = 0.02;
 
 /// Why a class of clips cannot be searched.
 #[derive(Debug, thiserror::Error)]
@@ -33,46 +31,15 @@ pub enum ClipsError {
     },
 }
 
-/// Lever arm of every moving joint, metres: the largest distance of a link's origin below it from its
-/// axis, all joints at zero. A joint position times this is a length, so that distances of poses are in
-/// metres and comparable between bodies; 1 for prismatic joints.
-pub fn lever_arms(model: &RobotModel) -> Vec<f64> {
-    let zero = vec![0.0; model.actuated.len()];
-    let mut levers = Vec::with_capacity(zero.len());
-    for j in &model.actuated {
-        let joint = &model.joints[*j];
-        if joint.kind == JointKind::Prismatic {
-            levers.push(1.0);
-            continue;
-        }
-        let frame = model.link_pose(joint.child, &zero);
-        let axis = frame.rotation * joint.axis.into_inner();
-        let mut lever = LEAST_LEVER_M;
-        for link in 0..model.links.len() {
-            let mut at = link;
-            while let Some(above) = model.parent_joint[at] {
-                if above == *j {
-                    let place = model.link_pose(link, &zero).translation.vector;
-                    let arm: Vector3<f64> = place - frame.translation.vector;
-                    lever = lever.max(arm.cross(&axis).norm());
-                    break;
-                }
-                at = model.joints[above].parent;
-            }
-        }
-        levers.push(lever);
-    }
-    levers
-}
-
 /// A class of clips as the animator blends it: common phase, every limb with its own timeline.
 ///
 /// Parameters are, in this order and as far as the clips have more than one value: amplitude,
 /// frequency, and the amount of an added path (crouch). From rest (the clip at amplitude 0) to the smallest
 /// moving clip the motion grows in proportion to amplitude, as in the animator.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct ClipBlend {
     name: String,
+    space: Arc<dyn PoseSpace>,
     kind: ClipKind,
     /// The moving clips; then the rest clip, if there is one.
     clips: Vec<Clip>,
@@ -85,18 +52,32 @@ pub struct ClipBlend {
     /// A point of the parameter space with all others at zero.
     straight: Parameters,
     free: Vec<usize>,
-    limb_of: Vec<Option<usize>>,
+    /// Coordinates of a pose in runs that belong to one limb (or to none).
+    runs: Vec<(Range<usize>, Option<usize>)>,
     offsets: Vec<Option<Vec<f64>>>,
-    levers: Vec<f64>,
     added: Option<Clip>,
 }
 
+impl std::fmt::Debug for ClipBlend {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ClipBlend")
+            .field("name", &self.name)
+            .field("clips", &self.clip_names())
+            .field("parameters", &self.parameter_names())
+            .finish_non_exhaustive()
+    }
+}
+
 impl ClipBlend {
-    /// A class of `examples`; `levers` as from [`lever_arms`], in joint order.
+    /// A class of `examples` whose poses are those of `space`.
     ///
     /// # Errors
     /// No moving clip; clips whose parameters or limbs do not fit together.
-    pub fn new(name: &str, examples: &[Example], levers: &[f64]) -> Result<Self, ClipsError> {
+    pub fn new(
+        name: &str,
+        examples: &[Example],
+        space: &Arc<dyn PoseSpace>,
+    ) -> Result<Self, ClipsError> {
         let nothing = || ClipsError::NothingMoves { class: name.into() };
         let moving: Vec<&Example> = examples.iter().filter(|e| e.parameters[0] > 0.0).collect();
         let first = moving.first().ok_or_else(nothing)?;
@@ -131,6 +112,7 @@ impl ClipBlend {
         }
         Ok(Self {
             name: name.into(),
+            space: Arc::clone(space),
             kind,
             clips: clips.into_iter().cloned().collect(),
             weights,
@@ -139,9 +121,8 @@ impl ClipBlend {
             low,
             high,
             straight,
-            limb_of,
+            runs: runs(&limb_of),
             offsets,
-            levers: levers.to_vec(),
             added: None,
         })
     }
@@ -211,21 +192,27 @@ impl ClipBlend {
         }
     }
 
+    /// Steps between references that bring the linear blend of features near the class's own blend: rest,
+    /// the smallest and the largest motion; more where the places of joints are curved in the pose.
+    pub fn steps(&self) -> usize {
+        let curved = self.space.tangent_len() != self.space.len();
+        match (curved, self.parameters()) {
+            (true, 0..=1) => 6,
+            (true, 2) => 4,
+            _ => 2,
+        }
+    }
+
     /// The class for the search, with references at `steps` steps per parameter and `frames` frames.
     ///
     /// # Errors
     /// Features that cannot be used.
-    pub fn search_class(
-        &self,
-        frames: usize,
-        steps: usize,
-        height_m: f64,
-    ) -> Result<SearchClass, FeatureError> {
+    pub fn search_class(&self, frames: usize, steps: usize) -> Result<SearchClass, FeatureError> {
         let cyclic = self.kind == ClipKind::Cycle;
         let spec = ClassSpec {
             frames,
-            height_m,
-            ..ClassSpec::new(&self.name, cyclic, self.levers.len())
+            height_m: self.space.size_m(),
+            ..ClassSpec::new(&self.name, cyclic, self.space.points())
         };
         SearchClass::subdivided(&spec, self.parameters(), steps, self)
     }
@@ -245,17 +232,11 @@ impl ClipBlend {
         weights
     }
 
-    /// Joint positions at `t`, blended as in the animator's steady state.
+    /// The pose at `t`, blended as in the animator's steady state.
     fn pose(&self, parameters: &[f64], t: f64, out: &mut [f64]) {
         let weights = self.clip_weights(parameters);
-        let limbs = self
-            .offsets
-            .iter()
-            .flatten()
-            .map(Vec::len)
-            .max()
-            .unwrap_or(0);
-        let timeline: Vec<f64> = (0..limbs)
+        let limbs = self.offsets.iter().flatten().map(Vec::len).max();
+        let timeline: Vec<f64> = (0..limbs.unwrap_or(0))
             .map(|limb| {
                 let (mut sin, mut cos) = (0.0, 0.0);
                 for (offsets, weight) in self.offsets.iter().zip(&weights) {
@@ -267,41 +248,55 @@ impl ClipBlend {
                 sin.atan2(cos)
             })
             .collect();
-        out.fill(0.0);
-        for ((clip, weight), offsets) in self.clips.iter().zip(&weights).zip(&self.offsets) {
-            for (joint, out) in out.iter_mut().enumerate() {
-                let shift = match (self.limb_of[joint], offsets) {
-                    (Some(limb), Some(offsets)) => timeline[limb] - offsets[limb],
+        let len = self.space.len();
+        let mut sampled = vec![0.0; self.clips.len() * len];
+        for (e, pose) in sampled.chunks_exact_mut(len.max(1)).enumerate() {
+            if weights[e] == 0.0 {
+                continue;
+            }
+            for (range, limb) in &self.runs {
+                let shift = match (limb, &self.offsets[e]) {
+                    (Some(limb), Some(offsets)) => timeline[*limb] - offsets[*limb],
                     _ => 0.0,
                 };
-                *out += weight * clip.sample(t + shift / TAU, joint);
+                let into = &mut pose[range.clone()];
+                self.clips[e].sample_range(t + shift / TAU, range.clone(), into);
             }
         }
+        self.space.blend(&sampled, &weights, out);
         if let (Some(path), Some(amount)) = (&self.added, parameters.get(self.free.len())) {
-            for (joint, out) in out.iter_mut().enumerate() {
-                *out += amount * (path.sample(1.0, joint) - path.sample(0.0, joint));
-            }
+            let (mut from, mut to) = (vec![0.0; len], vec![0.0; len]);
+            path.pose(0.0, &mut from);
+            path.pose(1.0, &mut to);
+            let mut way = vec![0.0; self.space.tangent_len()];
+            self.space.add_way(out, &from, &to, *amount, &mut way);
         }
     }
 }
 
 impl Synthesis for ClipBlend {
     fn width(&self) -> usize {
-        self.levers.len()
+        self.space.features()
     }
 
     fn duration_s(&self, parameters: &[f64]) -> f64 {
         match self.kind {
             ClipKind::Cycle => 1.0 / self.wish(parameters)[1].max(1e-3),
-            ClipKind::Path => PATH_S,
+            ClipKind::Path => {
+                // As the animator plays it: a blend of paths takes the blend of their durations.
+                let weights = self.clip_weights(parameters);
+                let takes_s: f64 = (self.clips.iter().zip(weights))
+                    .map(|(clip, weight)| weight * clip.duration_s)
+                    .sum();
+                if takes_s > 0.0 { takes_s } else { PATH_S }
+            }
         }
     }
 
     fn features(&self, parameters: &[f64], t: f64, out: &mut [f64]) {
-        self.pose(parameters, t, out);
-        for (out, lever) in out.iter_mut().zip(&self.levers) {
-            *out *= lever;
-        }
+        let mut pose = vec![0.0; self.space.len()];
+        self.pose(parameters, t, &mut pose);
+        self.space.embed(&pose, out);
     }
 
     fn root(&self, parameters: &[f64], t: f64) -> Option<[f64; 3]> {
