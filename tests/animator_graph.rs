@@ -98,7 +98,7 @@ impl Bench {
         };
         Self {
             animator: Animator::new(space, nodes, graph, Vec::new(), &ranges()),
-            watch: LimitWatch::new(&[limit.clone(), limit], DT_S),
+            watch: LimitWatch::new(&[limit, limit], DT_S),
             gestures: vec![(0.0, 1.0); n],
             drives: vec![Drive::default(); n],
             pose: vec![0.0; 2],

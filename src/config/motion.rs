@@ -149,6 +149,8 @@ mod tests {
             options: ClassOptions::default(),
             reverse: false,
             channel: None,
+            blend: crate::config::blending::BlendParts::default(),
+            blending: crate::body::Blending::Linear,
             extra: Vec::new(),
             examples: Vec::new(),
         };
