@@ -1,4 +1,4 @@
-//! Random gestures on the shipped walkers, two minutes on four legs and half a one on six: limits kept, nothing jumps, feet stay where they stand.
+//! Ten minutes of random gestures on each of the shipped walkers: limits kept, nothing jumps, feet stay where they stand.
 
 mod support;
 
@@ -236,11 +236,11 @@ fn perform(name: &str, character: &Character, minutes: f64, seed: u64) {
 }
 
 #[test]
-fn minutes_of_random_gestures_keep_limits_and_feet() {
+fn ten_minutes_of_random_gestures_keep_limits_and_feet() {
     for (name, character) in shipped() {
         match name.as_str() {
-            "quadruped.toml" => perform(&name, &character, 2.0, 7),
-            "hexapod.toml" => perform(&name, &character, 0.5, 7),
+            "quadruped.toml" => perform(&name, &character, 10.0, 7),
+            "hexapod.toml" => perform(&name, &character, 10.0, 7),
             _ => {}
         }
     }

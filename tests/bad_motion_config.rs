@@ -232,9 +232,10 @@ fn numbers_of_the_transition_search() {
         (r#"edges = [["locomotion", "prence"]]"#, "edges", "prance"),
         (r#"edges = [["bow", "locomotion"]]"#, "edges", "cycles"),
     ] {
-        let to = format!("[graph.search]\n{text}\n\n[robot]");
+        let to = format!("[graph.search]\n{text}\n\n");
         let folder = Folder::of_configs();
-        let line = folder.edit("quadruped.toml", "[robot]", &to) + 1;
+        let from = "search = { kappa = 180.0, latency_s = 0.6 }";
+        let line = folder.edit("quadruped.toml", from, &to) + 1;
         let at = format!("quadruped.toml:{line}");
         let ended = run_virtual(&[&folder.text("quadruped.toml")]);
         refused(ended, 2, &[&at, &format!("graph.search.{key}"), allowed]);

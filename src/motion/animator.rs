@@ -101,8 +101,11 @@ impl Animator {
 
     /// Keeps `feet` where they stand while the motion has them on the ground.
     pub fn with_pinned_feet(mut self, feet: Box<dyn Feet>) -> Self {
+        // Clips tell how the body stands; a pose map knows of joints alone.
+        let told = self.classes.iter().position(|c| c.clips().is_some());
+        let node = told.unwrap_or_else(|| self.graph.active());
         let mut standing = vec![0.0; self.space.len()];
-        self.rest_pose(&mut standing);
+        self.classes[node].rest_pose(self.space.as_ref(), &mut standing);
         let limbs = (self.classes.iter())
             .flat_map(|class| {
                 (0..feet.count())
@@ -152,6 +155,9 @@ impl Animator {
     pub fn rest_pose(&mut self, out: &mut [f64]) {
         let active = self.graph.active();
         self.classes[active].rest_pose(self.space.as_ref(), out);
+        if let (None, Some(feet)) = (self.classes[active].clips(), &self.pins) {
+            feet.pins.lower_to_ground(out);
+        }
     }
 
     /// Shows the performer's pose to `node`, if it is one that maps poses; before [`Animator::step`].
@@ -216,6 +222,9 @@ impl Animator {
             class.show(shown, &drives[node]);
             let pose = &mut self.poses[node * len..(node + 1) * len];
             self.played[node] = class.step(self.space.as_ref(), drives[node], dt_s, pose);
+            if let (None, Some(feet)) = (class.clips(), &self.pins) {
+                feet.pins.lower_to_ground(pose);
+            }
             let number = |v: f64| if v.is_finite() { v } else { 0.0 };
             self.asks[node] = Ask {
                 activation: number(class.activation(&drives[node])),

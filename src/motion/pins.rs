@@ -16,12 +16,12 @@ const LOW: f64 = 0.04;
 const SLOW_PER_S: f64 = 0.4;
 /// How fast what a pin left of an offset is taken back in flight, 1/s.
 const RETURN_RATE: f64 = 14.0;
-/// How fast a foot comes to rest at touch-down, 1/s: what it still moves is a 60th of its speed.
-const LANDING_RATE: f64 = 60.0;
+/// How fast a foot comes to rest at touch-down, 1/s: what it still moves is a 50th of its speed.
+const LANDING_RATE: f64 = 50.0;
 /// How fast it comes to ground height, 1/s, and with what acceleration at most, m/s^2: a foot that is put down
 /// from high up (a paw that was held out) must not be snatched.
 const SETTLING_RATE: f64 = 40.0;
-const SETTLING_M_S2: f64 = 8.0;
+const SETTLING_M_S2: f64 = 5.0;
 /// In flight an offset is taken back at most with this part of the foot's own speed, so that the shown
 /// foot keeps between half and one and a half of it.
 const FLIGHT_SPEED: f64 = 0.5;
@@ -45,9 +45,30 @@ struct Pin {
     height: Follower,
     settling_rate: f64,
     /// In flight: from the unconstrained foot to the shown one.
-    offset: [Follower; 3],
+    offset: Offset,
     /// Where the unconstrained foot was.
     free: Point3<f64>,
+}
+
+/// A difference that is taken back like a critically damped follower, alike in all directions: which way
+/// the body faces must not matter.
+#[derive(Copy, Clone, Debug, Default)]
+struct Offset {
+    value: Vector3<f64>,
+    speed: Vector3<f64>,
+}
+
+impl Offset {
+    /// One step towards nothing, not faster than `bound` (m/s).
+    fn step(&mut self, bound: f64, dt_s: f64) {
+        let k = RETURN_RATE * dt_s;
+        self.speed = (self.speed - RETURN_RATE * k * self.value) / (1.0 + 2.0 * k + k * k);
+        let fast = self.speed.norm();
+        if fast > bound {
+            self.speed *= bound / fast;
+        }
+        self.value += self.speed * dt_s;
+    }
 }
 
 impl Pin {
@@ -68,23 +89,21 @@ impl Pin {
     /// Lifts off or flies: goes over into the unconstrained motion without a step in place or speed.
     fn fly(&mut self, free: Point3<f64>, free_velocity: Vector3<f64>, dt_s: f64) {
         if self.on_ground {
-            for (axis, offset) in self.offset.iter_mut().enumerate() {
-                *offset = Follower::moving(
-                    self.at[axis] - self.free[axis],
-                    self.velocity[axis] - free_velocity[axis],
-                );
-            }
+            self.offset = Offset {
+                value: self.at - self.free,
+                speed: self.velocity - free_velocity,
+            };
         }
-        let bound = (FLIGHT_SPEED * free_velocity.norm()).max(LEAST_RETURN_M_S);
-        for (axis, offset) in self.offset.iter_mut().enumerate() {
-            // A bound that falls must not brake the foot at once.
-            let bound = bound.max(0.95 * offset.speed().abs());
-            let next = free[axis] + offset.step(0.0, RETURN_RATE, bound, dt_s);
-            if dt_s > 0.0 {
-                self.velocity[axis] = (next - self.at[axis]) / dt_s;
-            }
-            self.at[axis] = next;
+        // A bound that falls must not brake the foot at once.
+        let bound = (FLIGHT_SPEED * free_velocity.norm())
+            .max(LEAST_RETURN_M_S)
+            .max(0.95 * self.offset.speed.norm());
+        self.offset.step(bound, dt_s);
+        let next = free + self.offset.value;
+        if dt_s > 0.0 {
+            self.velocity = (next - self.at) / dt_s;
         }
+        self.at = next;
     }
 }
 
@@ -106,6 +125,16 @@ impl Pins {
             pins: vec![Pin::default(); count],
             feet,
             begun: false,
+        }
+    }
+
+    /// Moves the body of `pose` up or down until the lowest foot stands on the ground: for a motion that does
+    /// not tell where its body is.
+    pub(super) fn lower_to_ground(&self, pose: &mut [f64]) {
+        let over = |i: usize| self.feet.position(pose, i).z - self.ground_m[i];
+        let lowest = (0..self.pins.len()).map(over).fold(f64::INFINITY, f64::min);
+        if lowest.is_finite() {
+            self.feet.shift(pose, Vector3::new(0.0, 0.0, -lowest));
         }
     }
 

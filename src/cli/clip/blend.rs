@@ -5,10 +5,13 @@ use super::source::SourceArgs;
 use crate::base::print::{say, warn};
 use crate::cli::{ExitStatus, Failure};
 use crate::motion::analysis::{BodyModel, analyse, cut};
-use crate::motion::blending::{Blended, Pair, STEPS};
+#[cfg(feature = "plot")]
+use crate::motion::blending::STEPS;
+use crate::motion::blending::{Blended, Pair};
 use crate::motion::clip::{ClipFile, ClipKind};
 use crate::motion::take::Take;
 use crate::robot::RobotModel;
+#[cfg(feature = "plot")]
 use crate::view::plot::{Axis, Figure, Panel, Series, Style};
 use clap::Args;
 use serde_json::json;
@@ -91,14 +94,25 @@ pub fn run(args: &BlendArgs) -> Result<ExitStatus, Failure> {
         print(&a.name, &b.name, &rows);
     }
     if let Some(out) = &args.out {
-        let foot = feet.name(0);
-        let text = (figure(&a.name, &b.name, foot, &rows).svg())
-            .map_err(|e| Failure::input(e.to_string()))?;
-        std::fs::write(out, text)
-            .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
-        warn(format_args!("wrote {}", out.display()));
+        draw(out, &a.name, &b.name, feet.name(0), &rows)?;
     }
     Ok(ExitStatus::Done)
+}
+
+#[cfg(feature = "plot")]
+fn draw(out: &Path, a: &str, b: &str, foot: &str, rows: &[[Blended; 2]]) -> Result<(), Failure> {
+    let text = (figure(a, b, foot, rows).svg()).map_err(|e| Failure::input(e.to_string()))?;
+    std::fs::write(out, text)
+        .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
+    warn(format_args!("wrote {}", out.display()));
+    Ok(())
+}
+
+/// This build draws none.
+#[cfg(not(feature = "plot"))]
+fn draw(_: &Path, _: &str, _: &str, _: &str, _: &[[Blended; 2]]) -> Result<(), Failure> {
+    warn(format_args!("no plot: this build lacks the feature `plot`"));
+    Ok(())
 }
 
 fn read_model(path: &Path) -> Result<RobotModel, Failure> {
@@ -176,8 +190,10 @@ fn to_json(a: &str, b: &str, rows: &[[Blended; 2]]) -> serde_json::Value {
     json!({ "a": a, "b": b, "rows": rows })
 }
 
+#[cfg(feature = "plot")]
 const NAMES: [&str; 2] = ["with limb timelines", "without"];
 
+#[cfg(feature = "plot")]
 /// Heights of one foot in the middle, slide and hanging legs against weight.
 fn figure(a: &str, b: &str, foot: &str, rows: &[[Blended; 2]]) -> Figure {
     let middle = &rows[rows.len() / 2];

@@ -1,5 +1,6 @@
 //! `handwave clip info`: what a motion is, as a table, JSON or a plot.
 
+#[cfg(feature = "plot")]
 mod plots;
 
 use super::source::SourceArgs;
@@ -73,14 +74,27 @@ pub fn run(args: &InfoArgs) -> Result<ExitStatus, Failure> {
         print(&findings);
     }
     if let Some(out) = &args.plot {
-        let text = plots::figure(&findings)
-            .svg()
-            .map_err(|e| Failure::input(e.to_string()))?;
-        std::fs::write(out, text)
-            .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
-        warn(format_args!("wrote {}", out.display()));
+        draw(out, &findings)?;
     }
     Ok(ExitStatus::Done)
+}
+
+#[cfg(feature = "plot")]
+fn draw(out: &Path, findings: &Findings) -> Result<(), Failure> {
+    let text = plots::figure(findings)
+        .svg()
+        .map_err(|e| Failure::input(e.to_string()))?;
+    std::fs::write(out, text)
+        .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
+    warn(format_args!("wrote {}", out.display()));
+    Ok(())
+}
+
+/// This build draws none.
+#[cfg(not(feature = "plot"))]
+fn draw(_: &Path, _: &Findings) -> Result<(), Failure> {
+    warn(format_args!("no plot: this build lacks the feature `plot`"));
+    Ok(())
 }
 
 fn read_model(path: &Path) -> Result<RobotModel, Failure> {
