@@ -16,8 +16,12 @@ const LOW: f64 = 0.04;
 const SLOW_PER_S: f64 = 0.4;
 /// How fast what a pin left of an offset is taken back in flight, 1/s.
 const RETURN_RATE: f64 = 14.0;
-/// How fast a foot comes to rest at touch-down, 1/s: what it still moves is a 50th of its speed.
-const LANDING_RATE: f64 = 50.0;
+/// How fast a foot comes to rest at touch-down, 1/s: what it still moves is a 60th of its speed.
+const LANDING_RATE: f64 = 60.0;
+/// A foot that comes down faster is braked harder, so that it slides no further than this, metres, ...
+const LANDING_M: f64 = 0.0015;
+/// ... up to this rate, 1/s.
+const HARDEST_LANDING_RATE: f64 = 110.0;
 /// How fast it comes to ground height, 1/s, and with what acceleration at most, m/s^2: a foot that is put down
 /// from high up (a paw that was held out) must not be snatched.
 const SETTLING_RATE: f64 = 40.0;
@@ -44,6 +48,7 @@ struct Pin {
     /// Height over the ground while it stands.
     height: Follower,
     settling_rate: f64,
+    landing_rate: f64,
     /// In flight: from the unconstrained foot to the shown one.
     offset: Offset,
     /// Where the unconstrained foot was.
@@ -76,10 +81,12 @@ impl Pin {
     fn stand(&mut self, ground_m: f64, dt_s: f64) {
         if !self.on_ground {
             self.height = Follower::moving(self.at.z, self.velocity.z);
+            let fast_m_s = self.velocity.xy().norm();
+            self.landing_rate = (fast_m_s / LANDING_M).clamp(LANDING_RATE, HARDEST_LANDING_RATE);
             let drop_m = (self.at.z - ground_m).abs().max(1e-9);
             self.settling_rate = SETTLING_RATE.min((SETTLING_M_S2 / drop_m).sqrt());
         }
-        self.velocity *= (-LANDING_RATE * dt_s).exp();
+        self.velocity *= (-self.landing_rate * dt_s).exp();
         self.at.x += self.velocity.x * dt_s;
         self.at.y += self.velocity.y * dt_s;
         self.at.z = (self.height).step(ground_m, self.settling_rate, 1e3, dt_s);
