@@ -3,8 +3,8 @@
 //!
 //! The forward function `p = f(w)` is evaluated on samples of the weight space when the map is
 //! made, never while it is used. One parameter: a table along the chain of clips, ordered by their
-//! own values ([`chain`]). Several: a grid over simplices of the clips, a cubic fit on each, and a few
-//! damped Gauss-Newton steps from the nearest sample ([`faces`]). Weights are the sparsest that can
+//! own values (`chain`). Several: a grid over simplices of the clips, a cubic fit on each, and a few
+//! damped Gauss-Newton steps from the nearest sample (`faces`). Weights are the sparsest that can
 //! do it: at most one clip more than parameters.
 
 mod chain;

@@ -16,7 +16,7 @@
 //! All is done on plain arrays of Euclidean features, so that any body can use it: [`clips`] are
 //! what goes in, [`class`] holds the features of a class and its distances within, [`weight_map`] leads from parameters to blend weights,
 //! [`tables`] has the distances of an edge and the two forms of the similarity of blends, [`find`] is
-//! the search, [`stored`] the baseline with transition points fixed beforehand, [`calibrate`] finds kappa.
+//! the search, [`stored`] the baseline with transition points fixed beforehand, [`calibrate()`] finds kappa.
 //!
 //! The search is exact and visits few pairs ([`Search::find`] says how); [`Search::exhaustive`] visits all.
 //!
