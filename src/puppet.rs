@@ -11,7 +11,7 @@ use crate::motion::class::{Drive, EXTRA};
 use crate::motion::layer::{ChannelMap, LayerInput};
 use crate::motion::mapping::Seen;
 pub use crate::motion::node::ClassInput;
-use crate::motion::{Animator, ease};
+use crate::motion::{Animator, ease, eased_span_s};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
 use gaps::{GAP_S, Join, Tempo};
@@ -423,11 +423,9 @@ impl Puppet {
             .zip(&self.ramp.to)
             .zip(self.envelope.limits())
         {
-            let way = (to - from).abs();
-            // Peak slope 15/8 and peak curvature 10/sqrt(3) of the eased way.
-            let by_speed = 1.875 * way / (RAMP_SHARE * limit.velocity);
-            let by_acceleration = (5.774 * way / (RAMP_SHARE * limit.acceleration)).sqrt();
-            seconds = seconds.max(by_speed).max(by_acceleration);
+            let (velocity, acceleration) =
+                (RAMP_SHARE * limit.velocity, RAMP_SHARE * limit.acceleration);
+            seconds = seconds.max(eased_span_s(to - from, velocity, acceleration));
         }
         self.ramp.seconds = seconds;
     }

@@ -4,7 +4,7 @@ mod support;
 
 use handwave::body::{Feet, RootPose};
 use handwave::config::{self, Character, Files};
-use handwave::gesture::FrontEnd;
+use handwave::live::session;
 use handwave::motion::Animator;
 use handwave::motion::class::Drive;
 use handwave::motion::layer::LayerInput;
@@ -56,15 +56,7 @@ impl<'a> Walk<'a> {
 
     fn starting(character: &'a Character, root: RootPose) -> Self {
         let (header, _) = performance(character);
-        let front = FrontEnd::with_features(
-            &character.gestures,
-            &header,
-            character.front_options,
-            &character.neighbourhoods(),
-            &character.features(),
-        )
-        .expect("a front end");
-        let front = character.with_channels(front).expect("channels");
+        let front = session::front_end(character, &header).expect("a front end");
         let mut animator = character
             .animator(&front)
             .expect("an animator")

@@ -5,7 +5,7 @@ mod support;
 use handwave::base::random::SplitMix;
 use handwave::body::{Feet, RobotFeet, RootPose};
 use handwave::config::Character;
-use handwave::gesture::FrontEnd;
+use handwave::live::session;
 use handwave::motion::Animator;
 use handwave::motion::class::Drive;
 use handwave::motion::layer::{ChannelMap, LayerInput};
@@ -147,15 +147,7 @@ const HAND: [(f64, f64); 5] = [
 
 fn animator(character: &Character) -> (Animator, Vec<ClassInput>, usize) {
     let (header, _) = performance(character);
-    let front = FrontEnd::with_features(
-        &character.gestures,
-        &header,
-        character.front_options,
-        &character.neighbourhoods(),
-        &character.features(),
-    )
-    .expect("a front end");
-    let front = character.with_channels(front).expect("channels");
+    let front = session::front_end(character, &header).expect("a front end");
     let channels = front.channel_names().len();
     let inputs = character.class_inputs(&front).expect("inputs");
     (

@@ -6,7 +6,7 @@
 mod gait_support;
 mod support;
 
-use gait_support::{Robot, bundled, feet, robots, strain};
+use gait_support::{Robot, bundled, feet, robots, strain, way};
 use handwave::motion::clip::ClipFile;
 use handwave::motion::gait::{GaitDescription, GaitName};
 use std::path::Path;
@@ -21,14 +21,6 @@ fn ways(robot: &Robot) -> Vec<(&'static str, [f64; 3])> {
         ("sideways", [0.0, 0.15 * leg, 0.0]),
         ("curve backwards", [-0.2 * leg, 0.05 * leg, 0.2]),
     ]
-}
-
-fn way(gait: GaitName, [forward, left, turn]: [f64; 3]) -> GaitDescription {
-    let mut description = GaitDescription::preset(gait.name(), gait);
-    description.stride_m = Some(forward);
-    description.left_m = left;
-    description.turn_rad = turn;
-    description
 }
 
 #[test]

@@ -3,7 +3,7 @@
 mod gait_support;
 mod support;
 
-use gait_support::{Robot, bundled, feet, foot_points, robots, strain, stranger};
+use gait_support::{Robot, bundled, feet, foot_points, robots, strain, stranger, way};
 use handwave::motion::clip::ClipFile;
 use handwave::motion::gait::{GaitDescription, GaitName};
 use handwave::motion::gait_frames::author;
@@ -16,14 +16,6 @@ use support::program::{handwave, refused};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
-
-fn way(gait: GaitName, [forward, left, turn]: [f64; 3]) -> GaitDescription {
-    let mut description = GaitDescription::preset(gait.name(), gait);
-    description.stride_m = Some(forward);
-    description.left_m = left;
-    description.turn_rad = turn;
-    description
-}
 
 #[test]
 fn random_goals_within_reach_are_met_within_a_micrometre_inside_the_limits() {

@@ -1,6 +1,7 @@
 //! `handwave character`: a whole character, ready to run, from the URDF of a legged robot.
 
-use super::legged::{Legged, LeggedArgs, load, read};
+use super::disk::read;
+use super::legged::{Legged, LeggedArgs, load};
 use super::{ExitStatus, Failure, say};
 use crate::config::Files;
 use crate::config::starter::{Starter, StarterNames, starter};

@@ -99,11 +99,6 @@ fn load(config: Option<&Path>) -> Result<Character, Failure> {
     .map_err(Failure::input)
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text)
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))
-}
-
 fn make_folder(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(path)
         .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", path.display())))

@@ -1,5 +1,6 @@
 //! `handwave graph build`: clips come in, classes come out: groups, alignment, parameters, TOML.
 
+use super::disk::{self, read};
 use super::{ExitStatus, Failure, say};
 use crate::body::{JointSpace, PoseSpace, SkeletonSpace};
 use crate::motion::Clip;
@@ -9,7 +10,6 @@ use crate::motion::suggest::{
 };
 use crate::motion::warp::FeatureClip;
 use crate::motion::weights::{Weights, WeightsError};
-use crate::robot::RobotModel;
 use clap::Args;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -111,11 +111,6 @@ pub fn run(args: &BuildArgs) -> Result<ExitStatus, Failure> {
     }
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))
-}
-
 fn in_file(path: &Path, problem: &dyn std::fmt::Display) -> Failure {
     Failure::input(format!("{}: {problem}", path.display()))
 }
@@ -126,7 +121,7 @@ fn space(args: &BuildArgs, files: &[(&PathBuf, ClipFile)]) -> Result<Box<dyn Pos
     let first = &files[0].1;
     let floats = files.iter().any(|(_, f)| !f.body.is_empty());
     if let Some(urdf) = &args.urdf {
-        let model = RobotModel::from_urdf(&read(urdf)?).map_err(|e| in_file(urdf, &e))?;
+        let model = disk::read_model(urdf)?;
         return Ok(Box::new(JointSpace::of_robot(&model, floats)));
     }
     Ok(match &first.skeleton {

@@ -1,5 +1,6 @@
 //! A legged robot from the command line: its URDF, legs, facing and what its joints may do.
 
+use super::disk::read;
 use super::{Failure, warn};
 use crate::motion::gait_frames::Walker;
 use crate::motion::range::JointRange;
@@ -56,11 +57,6 @@ impl Legged {
 }
 
 /// Reads a file.
-pub(super) fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))
-}
-
 /// Reads the robot, finds its legs, and says what it took for what.
 pub(super) fn load(args: &LeggedArgs) -> Result<Legged, Failure> {
     let urdf = args.urdf.display();

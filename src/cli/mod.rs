@@ -3,6 +3,7 @@
 pub mod bus;
 pub mod character;
 pub mod clip;
+mod disk;
 mod failure;
 pub mod gesture;
 pub mod graph;

@@ -85,11 +85,6 @@ impl ClassParts {
         self.examples.iter().map(|e| e.clip.name.clone()).collect()
     }
 
-    /// The channel that drives the class in place of a gesture.
-    pub fn channel_name(&self) -> Option<&str> {
-        self.channel.as_ref().map(|c| c.channel.as_str())
-    }
-
     /// What drives the class, bound to the channels of `front`.
     pub(super) fn input(
         &self,

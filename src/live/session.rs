@@ -66,12 +66,8 @@ pub enum SessionError {
     Thread(#[from] std::io::Error),
 }
 
-/// Builds the puppet of `character` for a stream with `header`, at `rate_hz`.
-pub fn puppet(
-    character: &Character,
-    header: &PoseHeader,
-    rate_hz: f64,
-) -> Result<Puppet, SessionError> {
+/// The gesture front end of `character` for a stream with `header`.
+pub fn front_end(character: &Character, header: &PoseHeader) -> Result<FrontEnd, SessionError> {
     let front = FrontEnd::with_features(
         &character.gestures,
         header,
@@ -79,7 +75,16 @@ pub fn puppet(
         &character.neighbourhoods(),
         &character.features(),
     )?;
-    let front = character.with_channels(front)?;
+    Ok(character.with_channels(front)?)
+}
+
+/// Builds the puppet of `character` for a stream with `header`, at `rate_hz`.
+pub fn puppet(
+    character: &Character,
+    header: &PoseHeader,
+    rate_hz: f64,
+) -> Result<Puppet, SessionError> {
+    let front = front_end(character, header)?;
     let mut animator = character.animator(&front)?;
     let inputs = character.class_inputs(&front)?;
     let end_pose = character.end_pose.clone().unwrap_or_else(|| {

@@ -9,6 +9,7 @@ use super::mapping::Seen;
 use super::node::Node;
 use super::pins::Pins;
 use super::range::JointRange;
+use super::smooth::eased_span_s;
 use crate::body::{Feet, PoseSpace, RootAdvance, RootPose};
 
 /// Classes, the graph between them, and layers on top; all state of the character's motion.
@@ -174,11 +175,7 @@ impl Animator {
         let event = self.step_graph(drives, dt_s);
         let len = self.space.len();
         let active = self.graph.active();
-        let entering = self
-            .graph
-            .transition()
-            .filter(|t| t.jump_in_s.is_none())
-            .map(|t| t.to);
+        let entering = self.graph.entering();
         let blend = self.graph.blend();
         let of = |node: usize| node * len..(node + 1) * len;
         match entering {
@@ -212,11 +209,7 @@ impl Animator {
     fn play_classes(&mut self, drives: &[Drive], dt_s: f64) {
         std::mem::swap(&mut self.poses, &mut self.last_poses);
         let len = self.space.len();
-        let entering = self
-            .graph
-            .transition()
-            .filter(|t| t.jump_in_s.is_none())
-            .map(|t| t.to);
+        let entering = self.graph.entering();
         for (node, class) in self.classes.iter_mut().enumerate() {
             let shown = node == self.graph.active() || Some(node) == entering;
             class.show(shown, &drives[node]);
@@ -264,8 +257,11 @@ impl Animator {
                 &poses[to * len..(to + 1) * len],
                 difference,
             );
+            let ways = difference.iter().zip(fastest.iter());
             Plan::Blend {
-                span_s: eased_span_s(difference, fastest),
+                span_s: ways.fold(0.0, |most, (way, (v, a))| {
+                    eased_span_s(*way, *v, *a).max(most)
+                }),
             }
         };
         let waited = graph.transition();
@@ -415,16 +411,4 @@ impl Animator {
     pub fn root(&self) -> RootPose {
         self.root
     }
-}
-
-/// How long an eased way along `difference` takes within `fastest`, seconds.
-fn eased_span_s(difference: &[f64], fastest: &[(f64, f64)]) -> f64 {
-    difference
-        .iter()
-        .zip(fastest)
-        .map(|(way, (v, a))| {
-            // Peak slope 15/8 and peak curvature 10/sqrt(3) of the eased way.
-            (1.875 * way.abs() / v).max((5.774 * way.abs() / a).sqrt())
-        })
-        .fold(0.0, f64::max)
 }

@@ -9,7 +9,7 @@ mod build;
 mod cycle;
 mod path;
 
-use super::clip::{Clip, ClipKind, RootAdvance};
+use super::clip::{Clip, ClipKind, Limb, RootAdvance};
 use super::edge::RoutePoint;
 use super::range::{JointRange, Steepness};
 use super::smooth::Follower;
@@ -96,8 +96,8 @@ pub struct MotionClass {
     /// Examples x limbs: offset of the limb's timeline against the reference clip, rad; `None` for a
     /// clip without moving limbs.
     offsets: Vec<Option<Vec<f64>>>,
-    /// Examples x limbs: where in the clip the limb carries weight.
-    contacts: Vec<Contact>,
+    /// Examples x limbs: the limb in the clip; `None` where the clip does not move on it, but stands.
+    contacts: Vec<Option<Limb>>,
     state: State,
     /// The way to the exit of a transition that was chosen, while it is followed.
     route: Route,
@@ -109,15 +109,6 @@ pub struct MotionClass {
     sampled: Vec<f64>,
     moving_weights: Vec<f64>,
     weights: Vec<f64>,
-}
-
-/// When a limb carries weight in a clip.
-#[derive(Copy, Clone, Debug, PartialEq)]
-enum Contact {
-    /// The clip does not move on limbs: it stands.
-    Always,
-    /// From touch-down, a fraction of the clip, for another fraction.
-    During { from: f64, duty: f64 },
 }
 
 /// A way through amplitude and frequency to the point where the class is left.
@@ -444,9 +435,9 @@ impl MotionClass {
         let limbs = self.limbs.len();
         let mut vote = 0.0;
         for (e, weight) in self.weights.iter().enumerate() {
-            let on = match self.contacts[e * limbs + limb] {
-                Contact::Always => true,
-                Contact::During { from, duty } => {
+            let on = match &self.contacts[e * limbs + limb] {
+                None => true,
+                Some(there) => {
                     let u = self.point(e, Some(limb), phase);
                     // The end of a path is not its beginning.
                     let u = if self.kind == ClipKind::Path {
@@ -454,7 +445,7 @@ impl MotionClass {
                     } else {
                         u
                     };
-                    duty >= 1.0 || (u - from).rem_euclid(1.0) < duty
+                    there.in_contact(u)
                 }
             };
             vote += if on { *weight } else { 0.0 };

@@ -190,6 +190,11 @@ impl Graph {
         self.transition
     }
 
+    /// The class that is being blended in; none while a jump is waited for.
+    pub fn entering(&self) -> Option<usize> {
+        (self.transition.filter(|t| t.jump_in_s.is_none())).map(|t| t.to)
+    }
+
     /// A class that was asked for and waits until the active one may be left.
     pub fn queued(&self) -> Option<usize> {
         self.queued

@@ -3,6 +3,7 @@
 //! Parametric motion graph, section 7 ("the jump itself"): at a jump the difference of the two poses and
 //! its rate are taken, and a quintic that starts with them and ends with nothing is added to the target.
 
+use super::smooth::eased_span_s;
 use crate::body::PoseSpace;
 
 /// A fading difference between what is shown and what is played.
@@ -81,11 +82,10 @@ impl Inertia {
         self.since_s = 0.0;
         self.span_s = span_s;
         for ((offset, rate), (v, a)) in self.offset.iter().zip(&self.rate).zip(fastest) {
-            // Peak slope 15/8 and curvature 10/sqrt(3) of the eased way; the rate must be braked too.
+            // The rate must be braked too.
             self.span_s = self
                 .span_s
-                .max(1.875 * offset.abs() / v)
-                .max((5.774 * offset.abs() / a).sqrt())
+                .max(eased_span_s(*offset, *v, *a))
                 .max(3.0 * rate.abs() / a);
         }
         self.faded.copy_from_slice(&self.offset);

@@ -38,4 +38,4 @@ pub mod weights;
 
 pub use animator::Animator;
 pub use clip::{Clip, ClipError};
-pub use smooth::{Follower, ease};
+pub use smooth::{Follower, ease, eased_span_s};

@@ -37,6 +37,15 @@ impl Follower {
     }
 }
 
+/// How long an eased way must take so that it keeps inside `velocity` and `acceleration` (per second, and
+/// per second squared), seconds.
+pub fn eased_span_s(way: f64, velocity: f64, acceleration: f64) -> f64 {
+    // Peak slope 15/8 and peak curvature 10/sqrt(3) of `ease`.
+    let by_speed = 1.875 * way.abs() / velocity;
+    let by_acceleration = (5.774 * way.abs() / acceleration).sqrt();
+    by_speed.max(by_acceleration)
+}
+
 /// Smooth step from 0 to 1 with zero speed and acceleration at both ends; peak slope 15/8.
 pub fn ease(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);

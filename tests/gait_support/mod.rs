@@ -10,6 +10,15 @@ use handwave::robot::{Facing, Leg, RobotModel};
 use nalgebra::{Isometry2, Isometry3, Point3, Translation3, UnitQuaternion, Vector2};
 use std::path::{Path, PathBuf};
 
+/// A gait that goes somewhere: forwards and to the left (m), turning (rad), per cycle.
+pub fn way(gait: GaitName, [forward, left, turn]: [f64; 3]) -> GaitDescription {
+    let mut description = GaitDescription::preset(gait.name(), gait);
+    description.stride_m = Some(forward);
+    description.left_m = left;
+    description.turn_rad = turn;
+    description
+}
+
 pub struct Robot {
     pub name: &'static str,
     pub model: RobotModel,

@@ -3,6 +3,7 @@
 
 use super::source::SourceArgs;
 use crate::base::print::{say, warn};
+use crate::cli::disk;
 use crate::cli::{ExitStatus, Failure};
 use crate::motion::analysis::{BodyModel, analyse, cut};
 #[cfg(feature = "plot")]
@@ -58,7 +59,7 @@ pub struct BlendArgs {
 /// # Errors
 /// Files that cannot be read, motions without cycle or feet, bodies that differ (exit code 2).
 pub fn run(args: &BlendArgs) -> Result<ExitStatus, Failure> {
-    let model = args.urdf.as_deref().map(read_model).transpose()?;
+    let model = args.urdf.as_deref().map(disk::read_model).transpose()?;
     let (body, a) = cycle_of(&args.a, args, model.as_ref())?;
     let (_, b) = cycle_of(&args.b, args, model.as_ref())?;
     let Some(feet) = body.feet() else {
@@ -102,8 +103,7 @@ pub fn run(args: &BlendArgs) -> Result<ExitStatus, Failure> {
 #[cfg(feature = "plot")]
 fn draw(out: &Path, a: &str, b: &str, foot: &str, rows: &[[Blended; 2]]) -> Result<(), Failure> {
     let text = (figure(a, b, foot, rows).svg()).map_err(|e| Failure::input(e.to_string()))?;
-    std::fs::write(out, text)
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
+    disk::write(out, text)?;
     warn(format_args!("wrote {}", out.display()));
     Ok(())
 }
@@ -113,12 +113,6 @@ fn draw(out: &Path, a: &str, b: &str, foot: &str, rows: &[[Blended; 2]]) -> Resu
 fn draw(_: &Path, _: &str, _: &str, _: &str, _: &[[Blended; 2]]) -> Result<(), Failure> {
     warn(format_args!("no plot: this build lacks the feature `plot`"));
     Ok(())
-}
-
-fn read_model(path: &Path) -> Result<RobotModel, Failure> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
-    RobotModel::from_urdf(&text).map_err(|e| Failure::input(format!("{}: {e}", path.display())))
 }
 
 /// The body of a motion and one cycle of it: a clip as it is, of a recording the cycle that is found.

@@ -1,6 +1,7 @@
 //! `handwave clip export`: a clip, or any motion that can be imported, for other programs.
 
 use super::source::SourceArgs;
+use crate::cli::disk;
 use crate::cli::{ExitStatus, Failure, say, warn};
 use crate::motion::export::{robot_to_gltf, skeleton_to_gltf, to_bvh, to_csv};
 use crate::motion::import::ImportOptions;
@@ -66,8 +67,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<ExitStatus, Failure> {
         }
     }
     let bytes = encode(args, &take)?;
-    std::fs::write(&args.out, &bytes)
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", args.out.display())))?;
+    disk::write(&args.out, &bytes)?;
     say(format_args!(
         "{}: {} frames over {:.3} s, {} bytes",
         args.out.display(),

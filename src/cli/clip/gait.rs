@@ -1,6 +1,7 @@
 //! `handwave clip gait`: author gaits and poses for a legged URDF.
 
-use crate::cli::legged::{Legged, LeggedArgs, load, read};
+use crate::cli::disk::{self, read};
+use crate::cli::legged::{Legged, LeggedArgs, load};
 use crate::cli::{ExitStatus, Failure, say};
 use crate::motion::gait::{GaitDescription, GaitName};
 use crate::motion::gait_frames::{Authored, author, outside_limits};
@@ -70,8 +71,7 @@ pub(super) fn run(args: &GaitArgs) -> Result<ExitStatus, Failure> {
     let robot = load(&args.robot)?;
     let authored = author(&description, robot.walker(), args.strict)
         .map_err(|e| Failure::input(format!("{}: {e}", args.gait)))?;
-    std::fs::write(&args.out, authored.file.to_json())
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", args.out.display())))?;
+    disk::write(&args.out, authored.file.to_json())?;
     report(&args.out, &authored, &robot)
 }
 

@@ -1,6 +1,7 @@
 //! `handwave clip import`: a motion of another program as a clip.
 
 use super::source::SourceArgs;
+use crate::cli::disk;
 use crate::cli::{ExitStatus, Failure, say, warn};
 use crate::motion::analysis::cut::{self, CutOptions};
 use crate::motion::analysis::cycle::{self, Features};
@@ -128,8 +129,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<ExitStatus, Failure> {
     let text = clip.to_json();
     // What is written must be readable: a cycle in which a joint turns round is found here.
     let clip = ClipFile::from_json(&text).map_err(|e| bad(e.to_string()))?;
-    std::fs::write(&args.out, text)
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", args.out.display())))?;
+    disk::write(&args.out, text)?;
     report(args, &clip, duration_s);
     Ok(ExitStatus::Done)
 }

@@ -5,6 +5,7 @@ mod plots;
 
 use super::source::SourceArgs;
 use crate::base::print::{say, warn};
+use crate::cli::disk;
 use crate::cli::{ExitStatus, Failure};
 use crate::motion::analysis::cut::{self, CutOptions, Seam};
 use crate::motion::analysis::mirror::{self, Mirror, Symmetry};
@@ -60,7 +61,7 @@ struct Findings {
 
 /// Runs `handwave clip info ...`.
 pub fn run(args: &InfoArgs) -> Result<ExitStatus, Failure> {
-    let model = args.urdf.as_deref().map(read_model).transpose()?;
+    let model = args.urdf.as_deref().map(disk::read_model).transpose()?;
     let take = args.source.read(&args.file)?;
     // A clip of our own says more than its take: kind, limbs, root.
     let clip = std::fs::read_to_string(&args.file)
@@ -84,8 +85,7 @@ fn draw(out: &Path, findings: &Findings) -> Result<(), Failure> {
     let text = plots::figure(findings)
         .svg()
         .map_err(|e| Failure::input(e.to_string()))?;
-    std::fs::write(out, text)
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", out.display())))?;
+    disk::write(out, text)?;
     warn(format_args!("wrote {}", out.display()));
     Ok(())
 }
@@ -95,12 +95,6 @@ fn draw(out: &Path, findings: &Findings) -> Result<(), Failure> {
 fn draw(_: &Path, _: &Findings) -> Result<(), Failure> {
     warn(format_args!("no plot: this build lacks the feature `plot`"));
     Ok(())
-}
-
-fn read_model(path: &Path) -> Result<RobotModel, Failure> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
-    RobotModel::from_urdf(&text).map_err(|e| Failure::input(format!("{}: {e}", path.display())))
 }
 
 fn look(

@@ -3,7 +3,8 @@
 use super::classes::{Edge, classes, edges};
 use super::draw::{Arrow, Box as NodeBox, graph_svg};
 use super::matrix::matrix_svg;
-use super::{load, make_folder, write};
+use super::{load, make_folder};
+use crate::cli::disk::write;
 use crate::cli::{ExitStatus, Failure, say};
 use crate::config::Character;
 use crate::motion::class::Play;
@@ -31,7 +32,7 @@ pub(super) fn show(config: Option<&Path>, out: Option<&Path>) -> Result<ExitStat
     let folder = out.with_file_name(format!("{stem}_edges"));
     write(
         out,
-        &graph_svg(
+        graph_svg(
             &character.name,
             &boxes(&character),
             &arrows(&character, &edges),
@@ -51,7 +52,7 @@ pub(super) fn show(config: Option<&Path>, out: Option<&Path>) -> Result<ExitStat
             file_name(&source.name),
             file_name(&target.name)
         ));
-        write(&path, &matrix_svg(source, target, &edge.tables, &edge.best))?;
+        write(&path, matrix_svg(source, target, &edge.tables, &edge.best))?;
         say(format_args!("{}", path.display()));
     }
     Ok(ExitStatus::Done)

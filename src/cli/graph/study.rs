@@ -1,7 +1,8 @@
 //! `handwave graph study`: online transition search against stored transitions, cost, latency and time.
 
 use super::classes::FRAMES;
-use super::{load, make_folder, write};
+use super::{load, make_folder};
+use crate::cli::disk::write;
 use crate::cli::{ExitStatus, Failure, say, warn};
 use crate::config::Character;
 use crate::live::RealClock;
@@ -104,7 +105,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<ExitStatus, Failure> {
         ));
     }
     if let Some(out) = &args.out {
-        write(&out.join("study.csv"), &csv(&result.rows))?;
+        write(&out.join("study.csv"), csv(&result.rows))?;
         draw(&result, &source, &target, out)?;
     }
     Ok(ExitStatus::Done)
@@ -343,7 +344,7 @@ fn draw(
     };
     write(
         &out.join("study.svg"),
-        &figure.svg().map_err(Failure::input)?,
+        figure.svg().map_err(Failure::input)?,
     )
 }
 

@@ -1,8 +1,8 @@
 //! Building a class: kinds checked, weights fitted, limbs and contacts brought together.
 
-use super::{Contact, Example, MotionClass, Play, Route, State};
+use super::{Example, MotionClass, Play, Route, State};
 use crate::body::Blending;
-use crate::motion::clip::{Clip, ClipKind};
+use crate::motion::clip::{Clip, ClipKind, Limb};
 use crate::motion::limbs::timelines;
 use crate::motion::range::{JointRange, Steepness};
 use crate::motion::smooth::Follower;
@@ -286,17 +286,10 @@ pub(in crate::motion) fn runs(limb_of: &[Option<usize>]) -> Vec<(Range<usize>, O
     runs
 }
 
-/// Clips x limbs: when each limb carries weight.
-fn contacts(clips: &[&Clip], limbs: &[String]) -> Vec<Contact> {
-    let mut contacts = Vec::with_capacity(clips.len() * limbs.len());
-    for clip in clips {
-        for limb in limbs {
-            let found = clip.limbs.iter().find(|l| l.name == *limb);
-            contacts.push(found.map_or(Contact::Always, |l| Contact::During {
-                from: l.phase,
-                duty: l.duty,
-            }));
-        }
-    }
-    contacts
+/// Clips x limbs: each limb as the clip has it.
+fn contacts(clips: &[&Clip], limbs: &[String]) -> Vec<Option<Limb>> {
+    let of = |clip: &Clip, name: &String| clip.limbs.iter().find(|l| l.name == *name).cloned();
+    (clips.iter())
+        .flat_map(|clip| limbs.iter().map(|limb| of(clip, limb)))
+        .collect()
 }

@@ -5,6 +5,14 @@ use crate::body::{PoseSpace, RootAdvance};
 use std::f64::consts::TAU;
 
 impl MotionClass {
+    /// Weighs the paths for `drive`; returns the highest speed of progression that the joints allow, 1/s.
+    fn weigh_path(&mut self, drive: &Drive, dt_s: f64) -> f64 {
+        self.follow_extra(drive, dt_s);
+        self.weigh(self.wish(1.0, 0.0), 1.0);
+        // Steepness is kept per radian of phase; one progression is one turn of it.
+        (self.steepness).rate_limit(&self.weights, 1.0, &self.ranges, RANGE_SHARE) / TAU
+    }
+
     pub(super) fn step_path(
         &mut self,
         space: &dyn PoseSpace,
@@ -17,13 +25,7 @@ impl MotionClass {
         } else {
             0.0
         };
-        self.follow_extra(&drive, dt_s);
-        self.weigh(self.wish(1.0, 0.0), 1.0);
-        // Steepness is kept per radian of phase; one progression is one turn of it.
-        let fastest = self
-            .steepness
-            .rate_limit(&self.weights, 1.0, &self.ranges, RANGE_SHARE)
-            / TAU;
+        let fastest = self.weigh_path(&drive, dt_s);
         let before = self.state.amplitude.value.clamp(0.0, 1.0);
         let progression = self
             .state
@@ -54,12 +56,7 @@ impl MotionClass {
         dt_s: f64,
         out: &mut [f64],
     ) -> Played {
-        self.follow_extra(&drive, dt_s);
-        self.weigh(self.wish(1.0, 0.0), 1.0);
-        let fastest = self
-            .steepness
-            .rate_limit(&self.weights, 1.0, &self.ranges, RANGE_SHARE)
-            / TAU;
+        let fastest = self.weigh_path(&drive, dt_s);
         let takes_s: f64 = (self.examples.iter().zip(&self.weights))
             .map(|(e, w)| w * e.clip.duration_s)
             .sum();
