@@ -56,6 +56,21 @@ pub enum FrameError {
         /// Found at their end.
         found: u16,
     },
+    /// Another frame begins inside the body, where stuffing allows none: two frames, the first cut short.
+    HeaderInside,
+}
+
+/// Whether `body`, the bytes on the line from the instruction byte on, holds the start of another frame.
+///
+/// Stuffing keeps headers out of every body but that of the combined status of fast reads.
+pub(crate) fn holds_a_header(id: u8, body: &[u8]) -> bool {
+    !is_combined(id, body) && body.windows(HEADER.len()).any(|window| window == HEADER)
+}
+
+/// Whether a body belongs to the combined status of fast reads: the only status that comes from the
+/// broadcast id, and the only frame that is not stuffed.
+fn is_combined(id: u8, body: &[u8]) -> bool {
+    id == BROADCAST_ID && body.first() == Some(&STATUS)
 }
 
 impl fmt::Display for FrameError {
@@ -68,6 +83,9 @@ impl fmt::Display for FrameError {
             }
             FrameError::Crc { expected, found } => {
                 write!(f, "checksum {found:#06X}, expected {expected:#06X}")
+            }
+            FrameError::HeaderInside => {
+                f.write_str("another frame header FF FF FD 00 inside the body")
             }
         }
     }
@@ -109,9 +127,11 @@ impl<'a> Frame<'a> {
             return Err(FrameError::Crc { expected, found });
         }
         let body = &mut covered[PREFIX_LEN..];
+        if holds_a_header(id, body) {
+            return Err(FrameError::HeaderInside);
+        }
         let instruction = body[0];
-        // The combined status of fast reads, the only status that comes from the broadcast id, is not stuffed.
-        let len = if instruction == STATUS && id == BROADCAST_ID {
+        let len = if is_combined(id, body) {
             body.len()
         } else {
             unstuff(body)

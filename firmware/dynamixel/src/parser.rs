@@ -1,6 +1,6 @@
 //! Finds frames in a stream of bytes that may hold garbage, damage and halves.
 
-use crate::frame::{Frame, FrameError, HEADER, MIN_LEN, PREFIX_LEN};
+use crate::frame::{Frame, FrameError, HEADER, MIN_LEN, PREFIX_LEN, holds_a_header};
 use crate::is_valid_id;
 
 /// What a parser had to throw away.
@@ -103,7 +103,7 @@ impl<const N: usize> FrameParser<N> {
         };
         self.start = from + len;
         let frame: Result<_, FrameError> = Frame::parse(&mut self.buf[from..from + len]);
-        // All that `parse` checks was checked above.
+        // All that `parse` checks was checked above and in `candidate`.
         frame.ok()
     }
 
@@ -150,7 +150,12 @@ impl<const N: usize> FrameParser<N> {
             None => MIN_LEN,
             Some(field) => PREFIX_LEN + usize::from(u16::from_le_bytes([field[0], field[1]])),
         };
+        let (id, body_end) = (bytes.get(4), bytes.len().min(needed.saturating_sub(2)));
+        let body = bytes.get(PREFIX_LEN..body_end).unwrap_or_default();
         if !(MIN_LEN..=N).contains(&needed) {
+            Candidate::Garbage
+        } else if id.is_some_and(|&id| holds_a_header(id, body)) {
+            // A frame behind half a frame: no need to wait for the bytes that never come.
             Candidate::Garbage
         } else if bytes.len() >= needed && self.start + needed > self.gap && self.start < self.gap {
             // Its end came after an idle gap: two halves of different frames.

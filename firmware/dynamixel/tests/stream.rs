@@ -1,8 +1,9 @@
 //! The parser on a bad line: pieces, garbage, damage, gaps. It may lose frames, never invent one.
 
+use handwave_dynamixel::crc::crc16;
 use handwave_dynamixel::frame::MIN_LEN;
 use handwave_dynamixel::{
-    Frame, FrameParser, FrameWriter, Instruction, Status, fast::Blocks, is_valid_id,
+    Frame, FrameError, FrameParser, FrameWriter, Instruction, Status, fast::Blocks, is_valid_id,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -61,6 +62,29 @@ fn frame() -> impl Strategy<Value = Owned> {
     )
 }
 
+/// Found by chance: half a frame and the start of the next make a whole whose checksum happens to fit.
+#[test]
+fn a_header_inside_a_body_is_a_new_frame_even_where_the_checksum_fits() {
+    let second = (51, 0x34, vec![0xAA; 49]);
+    let mut stream = vec![0xFF, 0xFF, 0xFD, 0x00, 60, 32, 0];
+    stream.extend(&encode(&second)[..30]);
+    stream.extend(crc16(&stream).to_le_bytes());
+    let mut whole = stream.clone();
+    assert_eq!(
+        Frame::parse(&mut whole),
+        Err(FrameError::HeaderInside),
+        "{stream:02X?}"
+    );
+
+    stream.extend(encode(&second));
+    let mut parser = FrameParser::<512>::new();
+    assert_eq!(
+        feed(&mut parser, &stream, 512),
+        vec![second],
+        "{stream:02X?}"
+    );
+}
+
 proptest! {
     #[test]
     fn frames_come_out_as_they_went_in(frames in vec(frame(), 1..8), piece in 1usize..80) {
@@ -107,9 +131,13 @@ proptest! {
         let whole = encode(&first);
         let mut stream = whole[..cut.index(whole.len())].to_vec();
         stream.extend(encode(&second));
+        // One stream in 65536 cut within four bytes of its end makes a valid frame of both by accident:
+        // the checksum cannot tell, nor can the parser.
+        let borrowed = stream.get(..whole.len()).map(|bytes| Frame::parse(&mut bytes.to_vec()).is_ok());
+        prop_assume!(borrowed != Some(true));
         let mut parser = FrameParser::<512>::new();
         let mut frames = feed(&mut parser, &stream, 512);
-        // The half may still wait for bytes that never come; the gap ends that.
+        // A half cut at its checksum may still wait for bytes that never come; the gap ends that.
         parser.line_idle();
         while let Some(frame) = parser.next_frame() {
             frames.push(owned(frame));
