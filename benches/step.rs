@@ -3,6 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use handwave::base::{Clock, JointState, Time, VirtualClock};
+use handwave::bus::port::bare;
 use handwave::config::files::BUILT_IN;
 use handwave::config::{self, Character, Files};
 use handwave::live::{session, source, wire};
@@ -110,7 +111,7 @@ fn exchange(c: &mut Criterion) {
     let (character, _, _) = character();
     let clock = VirtualClock::new();
     let shared: Arc<dyn Clock> = Arc::new(clock.clone());
-    let mut bus = wire::open(&character, &character.bus, shared, RATE_HZ)
+    let mut bus = wire::open(&character, &character.bus, shared, RATE_HZ, &mut bare)
         .expect("the simulated line")
         .bus;
     let mut states = vec![JointState::default(); character.joints.len()];

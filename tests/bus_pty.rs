@@ -4,6 +4,7 @@ use handwave::base::{Clock, JointState};
 use handwave::bus::address::DynamixelBackend;
 use handwave::bus::dynamixel::model::Model;
 use handwave::bus::dynamixel::{self, ChainOptions, DynamixelChain, ServoSpec};
+use handwave::bus::port::bare;
 use handwave::bus::{BusError, ServoBus};
 use handwave::live::RealClock;
 use std::io::{BufRead, BufReader};
@@ -59,8 +60,14 @@ impl Simulator {
 
     fn chain(&self, servos: u8, backend: DynamixelBackend) -> (DynamixelChain, RealClock) {
         let clock = RealClock::new();
-        let client = dynamixel::open(self.path(), 1_000_000, backend, Arc::new(clock.clone()))
-            .expect("the port opens");
+        let client = dynamixel::open(
+            self.path(),
+            1_000_000,
+            backend,
+            Arc::new(clock.clone()),
+            &mut bare,
+        )
+        .expect("the port opens");
         let model = Model::by_name("xl430-w250").expect("a known model");
         let specs = (1..=servos)
             .map(|id| ServoSpec::new(id, format!("joint{id}"), model))

@@ -3,6 +3,7 @@
 mod support;
 
 use handwave::base::{Clock, JointState, VirtualClock};
+use handwave::bus::port::bare;
 use handwave::live::control::Ending;
 use handwave::live::session::{self, Observer, Session};
 use handwave::live::{CycleRecord, StopSwitch, source, wire};
@@ -64,7 +65,8 @@ fn the_ramp_begins_where_the_servos_were_armed_not_where_they_were_first_seen() 
     let character = built_in();
     let clock = VirtualClock::new();
     let shared: Arc<dyn Clock> = Arc::new(clock.clone());
-    let mut wire = wire::open(&character, &character.bus, shared, RATE_HZ).expect("a wire");
+    let mut wire =
+        wire::open(&character, &character.bus, shared, RATE_HZ, &mut bare).expect("a wire");
     let line = wire.line.clone().expect("simulated");
     let mut states = vec![JointState::default(); 12];
     wire.bus.prepare(&mut states).expect("a healthy chain");
@@ -126,7 +128,8 @@ fn after_a_pause_of_the_machine_no_goal_jumps() {
     for seconds in [0.05, 0.15, 0.4, 3.0] {
         let clock = VirtualClock::new();
         let shared: Arc<dyn Clock> = Arc::new(clock.clone());
-        let wire = wire::open(&character, &character.bus, shared, RATE_HZ).expect("a wire");
+        let wire =
+            wire::open(&character, &character.bus, shared, RATE_HZ, &mut bare).expect("a wire");
         let mut reader = source::open(&character.source, &character.files).expect("the poses");
         let first = source::first_sample(&mut reader).expect("a sample");
         let puppet = session::puppet(&character, reader.header(), RATE_HZ).expect("a puppet");

@@ -9,7 +9,7 @@ mod no_servos;
 pub mod port;
 pub mod serial;
 
-use crate::base::JointState;
+use crate::base::{JointState, Time};
 pub use address::{AddressError, BusAddress, DynamixelBackend};
 pub use no_servos::NoServos;
 pub use port::{Port, PortError};
@@ -64,11 +64,63 @@ pub trait ServoBus: Send {
     /// [`CycleReport::torqueless_mask`] and can be rearmed.
     fn reboot(&mut self, joint: usize) -> Result<(), BusError>;
 
+    /// What is known of each servo itself, in joint order, after [`prepare`](Self::prepare). Empty for a bus without servos.
+    fn facts(&self) -> &[ServoFacts] {
+        &[]
+    }
+
+    /// How each servo is, in joint order: read in turn, one servo in some cycles, where the cycle has room.
+    /// Empty for a bus without servos.
+    fn health(&self) -> &[ServoHealth] {
+        &[]
+    }
+
+    /// Looks for a lost bus once more, also under another name of its port (by serial number, or by the
+    /// ids that answer), and opens it. Changes no torque: [`prepare`](Self::prepare) and
+    /// [`arm`](Self::arm) follow when the operator wants it.
+    ///
+    /// Fails, at once or after some tenths of a second, while it is not there.
+    fn reopen(&mut self) -> Result<(), BusError> {
+        Ok(())
+    }
+
     /// What [`prepare`](Self::prepare) found worth telling the user though it stops nothing, such
     /// as a setting that costs bus time, with what to do.
     fn notes(&self) -> &[String] {
         &[]
     }
+}
+
+/// What is known of one servo after [`ServoBus::prepare`]: what it is, and what it bears.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ServoFacts {
+    /// Its id on its bus.
+    pub id: u8,
+    /// Its model, such as `xl430-w250`.
+    pub model: String,
+    /// The bus it hangs on, as written on the command line.
+    pub bus: String,
+    /// Above this it switches itself off, degrees Celsius.
+    pub temperature_limit_c: Option<f64>,
+    /// Least and greatest supply voltage that it bears, volts.
+    pub voltage_range_v: Option<(f64, f64)>,
+    /// The effort that it can give for long, in the unit of [`JointState::effort`].
+    pub effort_limit: Option<f64>,
+    /// After how long without an instruction it stops by itself, seconds; `None` when it does not.
+    pub watchdog_s: Option<f64>,
+}
+
+/// How a servo is, beside its motion: read now and then.
+#[derive(Copy, Clone, Debug, Default, PartialEq)]
+pub struct ServoHealth {
+    /// Temperature, degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// Supply voltage, volts.
+    pub voltage_v: Option<f64>,
+    /// Hardware error status (register 70) or the drive's error code; 0 is none.
+    pub hardware_error: u32,
+    /// When this was read, on the clock of the bus; `None` before the first time.
+    pub measured_at: Option<Time>,
 }
 
 /// What one [`ServoBus::exchange`] saw.

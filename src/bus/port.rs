@@ -60,3 +60,12 @@ pub trait Port: Send {
     /// Throws away what was received and not yet read.
     fn discard_input(&mut self) -> Result<(), PortError>;
 }
+
+/// Puts something around each port as it is opened, such as a tap that records its bytes: takes the
+/// bus as written and its port, returns the port that is used.
+pub type WrapPort<'a> = &'a mut dyn FnMut(&str, Box<dyn Port>) -> Box<dyn Port>;
+
+/// Leaves ports as they are.
+pub fn bare(_bus: &str, port: Box<dyn Port>) -> Box<dyn Port> {
+    port
+}

@@ -6,6 +6,7 @@ mod scan;
 
 use super::{ExitStatus, Failure};
 use crate::bus::dynamixel::{self, Client, ClientError, Model};
+use crate::bus::port::bare;
 use crate::bus::{AddressError, BusAddress};
 use crate::live::RealClock;
 use clap::{Args, Subcommand};
@@ -82,9 +83,8 @@ fn open(bus: &BusAddress) -> Result<Box<dyn Client>, Failure> {
             path,
             baud,
             backend,
-        } => {
-            dynamixel::open(path, *baud, *backend, Arc::new(RealClock::new())).map_err(Failure::bus)
-        }
+        } => dynamixel::open(path, *baud, *backend, Arc::new(RealClock::new()), &mut bare)
+            .map_err(Failure::bus),
     }
 }
 

@@ -5,6 +5,7 @@ use super::targets::TargetsFile;
 use super::{ExitStatus, Failure, say, warn};
 use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
+use crate::bus::port::bare;
 use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files, GestureFiles};
 use crate::gesture::PerformerScale;
@@ -289,10 +290,11 @@ fn session(
     let first = source.first_sample()?;
     let puppet =
         session::puppet(character, source.reader.header(), rate_hz).map_err(Failure::input)?;
-    let wire = wire::open(character, &character.bus, clock, rate_hz).map_err(|e| match e {
-        WireError::Port(_) => Failure::bus(e),
-        other => Failure::input(other),
-    })?;
+    let wire =
+        wire::open(character, &character.bus, clock, rate_hz, &mut bare).map_err(|e| match e {
+            WireError::Port(_) => Failure::bus(e),
+            other => Failure::input(other),
+        })?;
     let line = wire.line;
     Ok(Session {
         puppet,

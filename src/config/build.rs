@@ -4,12 +4,14 @@ use super::body::Body;
 use super::channel::{self, ChannelParts, channel_parts};
 use super::class::{ClassParts, class_parts};
 use super::error::{ConfigError, Pointer};
-use super::file::{CharacterFile, GestureEntry, OnExit, OnLost, OnServoFault};
+use super::file::{CharacterFile, GestureEntry};
 use super::files::Files;
 use super::gestures::{GestureFiles, Reader, merged};
 use super::layer::{LayerParts, layer_parts};
 use super::motion::{GraphParts, clip, graph_parts, neighbourhoods, read};
+use super::numbers::check_numbers;
 use super::parts::{Parts, parts};
+use super::safety::Safety;
 use super::search::{SearchParts, search_parts};
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
@@ -77,27 +79,6 @@ pub struct Character {
     channels: Vec<ChannelParts>,
     /// Paths of the gesture files, and what stood in them.
     gesture_texts: (Vec<String>, Vec<String>),
-}
-
-/// Ramps and policies, checked.
-#[derive(Copy, Clone, Debug, PartialEq)]
-pub struct Safety {
-    /// Least time to the first pose, seconds.
-    pub ramp_s: f64,
-    /// Least time into the end pose, seconds.
-    pub end_ramp_s: f64,
-    /// Prediction to the instant the servo acts, seconds.
-    pub actuation_delay_s: f64,
-    /// Age of poses up to which gestures go on, seconds.
-    pub coast_s: f64,
-    /// Age of poses from which they are lost, seconds.
-    pub lost_s: f64,
-    /// What then happens.
-    pub on_lost: OnLost,
-    /// What happens when a servo falls out.
-    pub on_servo_fault: OnServoFault,
-    /// Torque at the end.
-    pub on_exit: OnExit,
 }
 
 /// Loads the configuration `name` from `files` and checks all of it.
@@ -222,16 +203,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         front_options,
         gesture_texts: (paths, texts),
         reload: file.input.reload,
-        safety: Safety {
-            ramp_s: safety.ramp_s,
-            end_ramp_s: safety.end_ramp_s,
-            actuation_delay_s: safety.actuation_delay_s,
-            coast_s: safety.coast_s,
-            lost_s: safety.lost_s,
-            on_lost: safety.on_lost,
-            on_servo_fault: safety.on_servo_fault,
-            on_exit: safety.on_exit,
-        },
+        safety: Safety::of(safety),
         bus: wire.bus,
         sim_baud: wire.baud,
         rate_hz: wire.rate_hz,
@@ -429,61 +401,6 @@ fn joint_ranges(body: &Body, limits: &[JointEnvelope]) -> Vec<JointRange> {
             acceleration: l.acceleration,
         })
         .collect()
-}
-
-fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<(), ConfigError> {
-    let s = &file.safety;
-    let g = &file.graph;
-    let (robot, bus, avatar) = (file.robot.as_ref(), file.bus.as_ref(), file.avatar.as_ref());
-    let checks = [
-        ("input.window", file.input.window, 0.1, 2.0),
-        (
-            "robot.acceleration_rad_s2",
-            robot.map(|r| r.acceleration_rad_s2),
-            1.0,
-            1e5,
-        ),
-        (
-            "robot.velocity_share",
-            robot.map(|r| r.velocity_share),
-            0.01,
-            1.0,
-        ),
-        ("bus.rate_hz", bus.map(|b| b.rate_hz), 10.0, 2000.0),
-        ("bus.baud", bus.map(|b| f64::from(b.baud)), 9600.0, 4.5e6),
-        ("avatar.rate_hz", avatar.map(|a| a.rate_hz), 10.0, 2000.0),
-        ("avatar.unit_m", avatar.and_then(|a| a.unit_m), 1e-6, 1e3),
-        (
-            "bus.watchdog_ms",
-            bus.map(|b| f64::from(b.watchdog_ms)),
-            0.0,
-            2540.0,
-        ),
-        ("safety.ramp_s", Some(s.ramp_s), 0.1, 60.0),
-        ("safety.end_ramp_s", Some(s.end_ramp_s), 0.1, 60.0),
-        (
-            "safety.actuation_delay_s",
-            Some(s.actuation_delay_s),
-            0.0,
-            0.5,
-        ),
-        ("safety.coast_s", Some(s.coast_s), 0.0, 10.0),
-        ("safety.lost_s", Some(s.lost_s), s.coast_s + 0.05, 60.0),
-        ("graph.rise", g.rise, 0.01, 1.0),
-        ("graph.release", g.release, 0.01, 1.0),
-        ("graph.abort", g.abort, 0.0, g.rise.unwrap_or(0.2)),
-        ("graph.blend_s", g.blend_s, 0.1, 10.0),
-        ("graph.idle_s", g.idle_s, 0.0, 60.0),
-        ("view.refresh_hz", Some(file.view.refresh_hz), 1.0, 120.0),
-    ];
-    for (key, value, low, high) in checks {
-        if let Some(v) = value
-            && !(v >= low && v <= high)
-        {
-            return Err(at.key(key, format!("{v} is not in {low}..{high}")));
-        }
-    }
-    Ok(())
 }
 
 /// Where a clip leaves a robot's limits.

@@ -1,6 +1,12 @@
 //! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`,
 //! `[[channel]]` in `configs/face.toml`, `map` in `configs/arm.toml`.
 
+mod robot;
+mod safety;
+
+pub use robot::{BusEntry, JointEntry, RobotEntry};
+pub use safety::{OnExit, OnLost, OnServoFault, SafetyEntry};
+
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use toml::Spanned;
@@ -267,27 +273,6 @@ pub struct SearchEntry {
     pub edges: Option<Vec<Spanned<[String; 2]>>>,
 }
 
-/// The robot.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RobotEntry {
-    /// Path of the URDF.
-    pub urdf: Spanned<String>,
-    /// Acceleration every joint may use, rad/s^2.
-    pub acceleration_rad_s2: f64,
-    /// Share of the URDF's velocity limits to use.
-    #[serde(default = "one")]
-    pub velocity_share: f64,
-    /// Foot link of each leg, by leg name; found in the URDF when not given.
-    #[serde(default)]
-    pub legs: BTreeMap<String, String>,
-    /// Feet stay where they stand while the motion has them on the ground.
-    #[serde(default = "yes")]
-    pub pin_feet: bool,
-    /// Joint to servo.
-    pub joint: Vec<JointEntry>,
-}
-
 /// An avatar: a skeleton that is played without servos. Commented in `configs/fox.toml`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -320,112 +305,6 @@ pub struct LimbEntry {
     pub joints: usize,
 }
 
-/// One joint and its servo.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct JointEntry {
-    /// Joint name as in the URDF.
-    pub name: Spanned<String>,
-    /// Servo id on the bus.
-    pub servo: Spanned<u8>,
-    /// Servo position at joint position zero, pulses.
-    #[serde(default = "centre_pulse")]
-    pub zero_pulse: i32,
-    /// +1 or -1.
-    #[serde(default = "plus_one")]
-    pub direction: i8,
-    /// Lowest and highest servo position, pulses.
-    #[serde(default = "full_range")]
-    pub range_pulse: Spanned<[i32; 2]>,
-}
-
-/// The bus.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BusEntry {
-    /// `sim` or a bus such as `dynamixel:/dev/ttyUSB0@1000000`.
-    pub bus: String,
-    /// Baud rate of the simulated line.
-    #[serde(default = "one_megabaud")]
-    pub baud: u32,
-    /// Servo model that the configuration expects.
-    #[serde(default = "servo_model")]
-    pub model: Spanned<String>,
-    /// Control cycles per second.
-    #[serde(default = "control_rate")]
-    pub rate_hz: f64,
-    /// The servos stop by themselves after this long without a packet, ms; 0 is off.
-    #[serde(default = "watchdog")]
-    pub watchdog_ms: u32,
-}
-
-/// Ramps and safe states.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SafetyEntry {
-    /// Least time from the present pose to the first pose, seconds.
-    #[serde(default = "two")]
-    pub ramp_s: f64,
-    /// Path of a clip whose end is the end pose; the rest pose when not given.
-    pub end_clip: Option<Spanned<String>>,
-    /// Least time into the end pose, seconds.
-    #[serde(default = "two")]
-    pub end_ramp_s: f64,
-    /// From computing a target to the servo acting on it, seconds.
-    #[serde(default = "actuation_delay")]
-    pub actuation_delay_s: f64,
-    /// Poses may be missing this long before gestures fade, seconds.
-    #[serde(default = "coast")]
-    pub coast_s: f64,
-    /// Poses count as lost after this long, seconds.
-    #[serde(default = "one")]
-    pub lost_s: f64,
-    /// `idle`, `hold` or `stop`.
-    #[serde(default)]
-    pub on_lost: OnLost,
-    /// A servo latches a hardware error or comes back without torque: `stop` or `continue`.
-    #[serde(default)]
-    pub on_servo_fault: OnServoFault,
-    /// Torque at the end of a run: `torque_off` or `hold`.
-    #[serde(default)]
-    pub on_exit: OnExit,
-}
-
-/// What happens when poses are lost.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OnLost {
-    /// Come to rest and wait.
-    #[default]
-    Idle,
-    /// Hold the pose and wait.
-    Hold,
-    /// Lie down, torque off, exit code 4.
-    Stop,
-}
-
-/// What happens when a servo falls out.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OnServoFault {
-    /// Lie down, torque off, exit code 4.
-    #[default]
-    Stop,
-    /// Report it and play on with the others.
-    Continue,
-}
-
-/// Servo state at the end of a run.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OnExit {
-    /// End pose, then torque off, read back.
-    #[default]
-    TorqueOff,
-    /// End pose, torque stays on.
-    Hold,
-}
-
 /// The terminal view.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -433,22 +312,6 @@ pub struct ViewEntry {
     /// Pictures per second.
     #[serde(default = "refresh")]
     pub refresh_hz: f64,
-}
-
-impl Default for SafetyEntry {
-    fn default() -> Self {
-        Self {
-            ramp_s: two(),
-            end_clip: None,
-            end_ramp_s: two(),
-            actuation_delay_s: actuation_delay(),
-            coast_s: coast(),
-            lost_s: one(),
-            on_lost: OnLost::default(),
-            on_servo_fault: OnServoFault::default(),
-            on_exit: OnExit::default(),
-        }
-    }
 }
 
 impl Default for ViewEntry {
@@ -468,36 +331,9 @@ fn yes() -> bool {
 fn two_joints() -> usize {
     2
 }
-fn two() -> f64 {
-    2.0
-}
-fn coast() -> f64 {
-    0.3
-}
-fn actuation_delay() -> f64 {
-    0.02
-}
 fn refresh() -> f64 {
     20.0
 }
 fn control_rate() -> f64 {
     200.0
-}
-fn watchdog() -> u32 {
-    200
-}
-fn one_megabaud() -> u32 {
-    1_000_000
-}
-fn servo_model() -> Spanned<String> {
-    Spanned::new(0..0, "xl430-w250".into())
-}
-fn centre_pulse() -> i32 {
-    2048
-}
-fn plus_one() -> i8 {
-    1
-}
-fn full_range() -> Spanned<[i32; 2]> {
-    Spanned::new(0..0, [0, 4095])
 }

@@ -5,6 +5,7 @@ use crate::bus::dynamixel::model::STATE_BYTES;
 use crate::bus::dynamixel::{
     self, ChainOptions, Client, DynamixelChain, Master, MasterOptions, SpecError,
 };
+use crate::bus::port::WrapPort;
 use crate::bus::{BusAddress, NoServos, PortError, ServoBus};
 use crate::config::Character;
 use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
@@ -52,12 +53,14 @@ pub enum WireError {
     NoBackend,
 }
 
-/// Opens `address` for the servos of `character`, on `clock`, for `rate_hz` cycles per second.
+/// Opens `address` for the servos of `character`, on `clock`, for `rate_hz` cycles per second; ports
+/// are `wrap`ped as they are opened.
 pub fn open(
     character: &Character,
     address: &BusAddress,
     clock: Arc<dyn Clock>,
     rate_hz: f64,
+    wrap: WrapPort<'_>,
 ) -> Result<Wire, WireError> {
     if character.body.avatar.is_some() {
         let bus = NoServos::new(character.joints.clone(), character.standing());
@@ -79,8 +82,9 @@ pub fn open(
         BusAddress::Sim => {
             let line = simulated_line(character)?;
             let port = SimPort::new(line.clone(), clock, character.sim_baud);
+            let port = wrap("sim", Box::new(port));
             (
-                Box::new(Master::new(Box::new(port), MasterOptions::default())),
+                Box::new(Master::new(port, MasterOptions::default())),
                 Some(line),
             )
         }
@@ -88,7 +92,7 @@ pub fn open(
             path,
             baud,
             backend,
-        } => (dynamixel::open(path, *baud, *backend, clock)?, None),
+        } => (dynamixel::open(path, *baud, *backend, clock, wrap)?, None),
     };
     let chain = DynamixelChain::new(client, character.servos.clone(), options)?;
     Ok(Wire {

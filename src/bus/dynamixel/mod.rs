@@ -27,31 +27,34 @@ pub use backend_dynamixel2::Dynamixel2Client;
 pub use chain::{ChainOptions, DynamixelChain};
 pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
 pub use master::{Master, MasterOptions};
-pub use model::{Model, Register};
+pub use model::{Model, Protocol, Register};
 pub use servo::{Direction, ServoSpec, SpecError};
 
 use super::address::DynamixelBackend;
-use super::port::PortError;
+use super::port::{PortError, WrapPort};
 use super::serial::SerialPort;
 use crate::base::Clock;
 use std::sync::Arc;
 
 /// Opens a serial port and puts a client on it.
 ///
-/// Where the adapter holds bytes back (see [`SerialPort::latency_timer`]), waits allow for it.
+/// Where the adapter holds bytes back (see [`SerialPort::latency_timer`]), waits allow for it. The port is
+/// `wrap`ped as bus `bus`; the `dynamixel2` backend opens its own and is not.
 /// Fails like [`SerialPort::open`], or when the backend is not built in.
 pub fn open(
     path: &str,
     baud: u32,
     backend: DynamixelBackend,
     clock: Arc<dyn Clock>,
+    wrap: WrapPort<'_>,
 ) -> Result<Box<dyn Client>, PortError> {
     match backend {
         DynamixelBackend::Handwave => {
             let port = SerialPort::open(path, baud, clock)?;
             let mut options = MasterOptions::default();
             options.max_allowance += port.latency_timer().unwrap_or_default();
-            Ok(Box::new(Master::new(Box::new(port), options)))
+            let port = wrap(&format!("dynamixel:{path}@{baud}"), Box::new(port));
+            Ok(Box::new(Master::new(port, options)))
         }
         #[cfg(feature = "dxl-serial2")]
         DynamixelBackend::Dynamixel2 => Ok(Box::new(Dynamixel2Client::open(path, baud, clock)?)),

@@ -97,9 +97,21 @@ impl Register {
     }
 }
 
+/// The protocol that a servo speaks.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum Protocol {
+    /// Protocol 1.0: AX and old MX servos.
+    One,
+    /// Protocol 2.0.
+    #[default]
+    Two,
+}
+
 /// A servo model.
 #[derive(Debug, PartialEq)]
 pub struct Model {
+    /// The protocol that it speaks out of the box.
+    pub protocol: Protocol,
     /// Name as in the vendor's catalogue, lower case, such as `xl430-w250`.
     pub name: &'static str,
     /// Model number (register 0).
@@ -149,6 +161,7 @@ pub static MODELS: [&Model; 1] = [&XL430_W250];
 
 /// XL430-W250: the servo of small walking robots. Reports load, not current.
 pub static XL430_W250: Model = Model {
+    protocol: Protocol::Two,
     name: "xl430-w250",
     number: 1060,
     fast_reads_since: 45,

@@ -1,0 +1,90 @@
+//! `[robot]` and `[bus]` as a user writes them: joints, their servos, the line that carries them.
+
+use super::{control_rate, one, yes};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use toml::Spanned;
+
+/// The robot.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotEntry {
+    /// Path of the URDF.
+    pub urdf: Spanned<String>,
+    /// Acceleration every joint may use, rad/s^2.
+    pub acceleration_rad_s2: f64,
+    /// Share of the URDF's velocity limits to use.
+    #[serde(default = "one")]
+    pub velocity_share: f64,
+    /// Foot link of each leg, by leg name; found in the URDF when not given.
+    #[serde(default)]
+    pub legs: BTreeMap<String, String>,
+    /// Feet stay where they stand while the motion has them on the ground.
+    #[serde(default = "yes")]
+    pub pin_feet: bool,
+    /// Joint to servo.
+    pub joint: Vec<JointEntry>,
+}
+
+/// One joint and its servo.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointEntry {
+    /// Joint name as in the URDF.
+    pub name: Spanned<String>,
+    /// Servo id on the bus.
+    pub servo: Spanned<u8>,
+    /// Servo position at joint position zero, pulses.
+    #[serde(default = "centre_pulse")]
+    pub zero_pulse: i32,
+    /// +1 or -1.
+    #[serde(default = "plus_one")]
+    pub direction: i8,
+    /// Lowest and highest servo position, pulses.
+    #[serde(default = "full_range")]
+    pub range_pulse: Spanned<[i32; 2]>,
+}
+
+/// The bus.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BusEntry {
+    /// `sim` or a bus such as `dynamixel:/dev/ttyUSB0@1000000`.
+    pub bus: String,
+    /// Baud rate of the simulated line.
+    #[serde(default = "one_megabaud")]
+    pub baud: u32,
+    /// Servo model that the configuration expects.
+    #[serde(default = "servo_model")]
+    pub model: Spanned<String>,
+    /// Control cycles per second.
+    #[serde(default = "control_rate")]
+    pub rate_hz: f64,
+    /// The servos stop by themselves after this long without a packet, ms; 0 is off.
+    #[serde(default = "watchdog")]
+    pub watchdog_ms: u32,
+}
+
+fn watchdog() -> u32 {
+    200
+}
+
+fn one_megabaud() -> u32 {
+    1_000_000
+}
+
+fn servo_model() -> Spanned<String> {
+    Spanned::new(0..0, "xl430-w250".into())
+}
+
+fn centre_pulse() -> i32 {
+    2048
+}
+
+fn plus_one() -> i8 {
+    1
+}
+
+fn full_range() -> Spanned<[i32; 2]> {
+    Spanned::new(0..0, [0, 4095])
+}
