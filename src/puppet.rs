@@ -4,6 +4,7 @@
 //! and benchmarks call this one function, so the same input gives the same bytes out.
 
 mod gaps;
+mod guided;
 
 use crate::base::{JointState, Time};
 use crate::gesture::{FrontEnd, GestureEstimate, GestureKind};
@@ -15,6 +16,7 @@ use crate::motion::{Animator, ease, eased_span_s};
 use crate::pose::PoseSample;
 use crate::robot::Envelope;
 use gaps::{GAP_S, Join, Tempo};
+use guided::Guidance;
 use std::f64::consts::TAU;
 
 /// What happens when poses have been missing for longer than `lost_s`.
@@ -90,6 +92,8 @@ pub struct Targets {
     pub pose_age_s: Option<f64>,
     /// Poses are older than the limit while they should be driving the robot.
     pub poses_lost: bool,
+    /// Joints whose pose was no number in this cycle; the envelope brakes them.
+    pub not_finite: usize,
 }
 
 /// A character that is being played: gesture front end, animator, envelope and the stages of a run.
@@ -118,6 +122,7 @@ pub struct Puppet {
     pose: Vec<f64>,
     last_pose: Vec<f64>,
     still_s: f64,
+    guidance: Guidance,
     targets: Targets,
 }
 
@@ -206,6 +211,7 @@ impl Puppet {
             pose: vec![0.0; coordinates],
             last_pose: vec![0.0; coordinates],
             still_s: 0.0,
+            guidance: Guidance::new(joints),
             targets: Targets {
                 positions: vec![0.0; joints],
                 ..Targets::default()
@@ -247,7 +253,7 @@ impl Puppet {
                 }
             }
             Stage::Playing => {
-                self.play(now, 1.0);
+                self.play(now, self.guidance.vigour);
                 if inputs.finish
                     || (self.targets.poses_lost && self.options.on_lost == LostPolicy::Stop)
                 {
@@ -269,8 +275,9 @@ impl Puppet {
             Stage::Done => self.pose[..self.end_pose.len()].copy_from_slice(&self.end_pose),
         }
         let joints = self.end_pose.len();
-        self.targets.held_back =
-            (self.envelope).pass(&self.pose[..joints], &mut self.targets.positions);
+        let asked = self.guidance.apply(now, &self.pose[..joints]);
+        self.targets.not_finite = asked.iter().filter(|p| !p.is_finite()).count();
+        self.targets.held_back = (self.envelope).pass(asked, &mut self.targets.positions);
         self.targets.stage = self.stage;
         &self.targets
     }
@@ -312,10 +319,20 @@ impl Puppet {
         let fading = (age - self.options.coast_s) / (self.options.lost_s - self.options.coast_s);
         let holds = share > 0.0 && (fading < 1.0 || self.options.on_lost == LostPolicy::Hold);
         let share = if holds || fading < 1.0 { share } else { 0.0 };
-        let goal = if holds { 1.0 - ease(fading) } else { 1.0 };
+        let goal = match (self.guidance.hold, holds) {
+            (true, _) => 0.0,
+            (false, true) => 1.0 - ease(fading),
+            (false, false) => 1.0,
+        };
         let dt_s = self.tempo.step(goal, self.options.dt_s);
         if fading <= 0.0 {
             self.tempo.held_s = 0.0;
+            if self.guidance.slowed(dt_s < self.options.dt_s) {
+                // Poses come, so gestures went on where time did not.
+                for join in &mut self.joins {
+                    join.fall_behind(self.options.dt_s - dt_s);
+                }
+            }
         } else {
             self.tempo.held_s += self.options.dt_s - dt_s;
         }
@@ -423,8 +440,8 @@ impl Puppet {
             .zip(&self.ramp.to)
             .zip(self.envelope.limits())
         {
-            let (velocity, acceleration) =
-                (RAMP_SHARE * limit.velocity, RAMP_SHARE * limit.acceleration);
+            let share = RAMP_SHARE * self.guidance.vigour.max(0.1);
+            let (velocity, acceleration) = (share * limit.velocity, share * limit.acceleration);
             seconds = seconds.max(eased_span_s(to - from, velocity, acceleration));
         }
         self.ramp.seconds = seconds;

@@ -6,6 +6,7 @@ use super::{ExitStatus, Failure, say, warn};
 use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
 use crate::bus::port::bare;
+use crate::config::file::OnBusLost;
 use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files, GestureFiles};
 use crate::gesture::PerformerScale;
@@ -56,6 +57,9 @@ pub const EXAMPLES: &str = "Examples:
   handwave run --fault \"7:silent@8s..9s\"              see what a silent servo does
 
 Ctrl-C once: the robot comes to rest, lies down, torque goes off. Twice: torque goes off at once.
+A servo that fell out, or a bus that is back, is taken into control again by key r or SIGUSR1 ([safety] rearm).
+[safety] of a configuration says what is watched and what follows: on_servo_fault, on_bus_lost, on_overrun,
+on_lost, stop_gesture, limits for following error, stall, temperature, supply and effort (configs/quadruped.toml).
 Exit codes: 0 done, 2 bad usage, config or input, 3 bus failure, 4 safety stop, 130 interrupted.";
 
 /// Options of `handwave run`.
@@ -208,6 +212,10 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             let clock: Arc<dyn Clock> = Arc::new(RealClock::new());
             if !options.headless {
                 onlooker.display = Display::open(&character, &stop);
+                if !onlooker.display.shares_the_terminal() {
+                    // Somebody looks on and has a key to re-arm with.
+                    character.safety.on_bus_lost.get_or_insert(OnBusLost::Wait);
+                }
             }
             let session = session(
                 options,

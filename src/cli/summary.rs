@@ -4,21 +4,31 @@ use crate::config::Character;
 use crate::gesture::TrackingCounts;
 use crate::live::control::Ending;
 use crate::live::footing::Slides;
+use crate::live::safety::{Crew, FaultKind};
 use crate::live::session::Report;
-use crate::live::stats::{FaultKind, Percentiles, ServoFault};
+use crate::live::stats::{Fault, Percentiles};
 use serde_json::{Value, json};
 
 /// The summary as one JSON object.
 pub fn to_json(report: &Report, slides: Option<Slides>, character: &Character) -> Value {
     let stats = &report.stats;
     let torque = report.torque.as_ref().and_then(|t| t.as_ref().ok());
-    let faults: Vec<Value> = stats
-        .faults
-        .iter()
+    let faults: Vec<Value> = (stats.faults.iter())
+        .filter_map(|f| {
+            let joint = f.joint?;
+            Some(json!({
+                "servo": character.servos.get(joint).map(|s| s.id), "joint": character.joints.get(joint),
+                "fault": f.kind.as_str(), "from_s": f.from_s, "to_s": f.to_s,
+                "measured": measured(f), "value": f.value, "limit": f.limit, "advice": f.kind.advice(),
+            }))
+        })
+        .collect();
+    let events: Vec<Value> = (stats.faults.iter())
+        .filter(|f| f.joint.is_none())
         .map(|f| {
             json!({
-                "servo": character.servos[f.joint].id, "joint": character.joints[f.joint],
-                "fault": f.kind.as_str(), "from_s": f.from_s, "to_s": f.to_s,
+                "event": f.kind.as_str(), "from_s": f.from_s, "to_s": f.to_s,
+                "measured": measured(f), "advice": f.kind.advice(),
             })
         })
         .collect();
@@ -41,7 +51,7 @@ pub fn to_json(report: &Report, slides: Option<Slides>, character: &Character) -
         "poses_lost_cycles": stats.poses_lost,
         "bus_errors": stats.silent + stats.damaged, "replies_missing": stats.silent,
         "damage": stats.damaged, "bus_bytes": stats.bytes,
-        "faults": faults, "more_faults": stats.more_faults,
+        "faults": faults, "more_faults": stats.more_faults, "events": events,
         "pose_to_wire_us": stats.pose_to_wire.percentiles(), "bus_cycle_us": stats.exchange.percentiles(),
         "step_us": stats.step.percentiles(), "lateness_us": stats.lateness.percentiles(),
         "records_lost": report.records_lost,
@@ -152,28 +162,39 @@ fn torque_lines(report: &Report, character: &Character) -> String {
     text
 }
 
-/// One line per servo and kind of fault, with the first few times; faults that struck all servos at
-/// once are those of the line, not of a servo, and get one line together.
+/// What was measured of a fault; `None` when nothing was.
+fn measured(fault: &Fault) -> Option<String> {
+    let text = fault.kind.measured(fault.value, fault.limit);
+    (!text.is_empty()).then_some(text)
+}
+
+/// One line per servo and kind of fault, with the first few times, what was measured and what to do; faults that
+/// struck all servos at once are those of the line, not of a servo, and get one line together.
 fn fault_lines(report: &Report, character: &Character) -> String {
     if character.servos.is_empty() {
         return String::new();
     }
     let stats = &report.stats;
-    let at_once = |fault: &ServoFault| {
-        let same = |f: &&ServoFault| f.kind == fault.kind && f.from_s == fault.from_s;
-        character.joints.len() > 1
+    let ids: Vec<u8> = character.servos.iter().map(|s| s.id).collect();
+    let crew = Crew {
+        joints: &character.joints,
+        ids: &ids,
+    };
+    let at_once = |fault: &Fault| {
+        let same = |f: &&Fault| f.kind == fault.kind && f.from_s == fault.from_s;
+        fault.joint.is_some()
+            && character.joints.len() > 1
             && stats.faults.iter().filter(same).count() == character.joints.len()
     };
-    let (whole, single): (Vec<&ServoFault>, Vec<&ServoFault>) =
-        stats.faults.iter().partition(|f| at_once(f));
+    let (whole, single): (Vec<&Fault>, Vec<&Fault>) = stats.faults.iter().partition(|f| at_once(f));
     let mut text = String::new();
     for kind in FaultKind::ALL {
-        let first_joint = whole.iter().filter(|f| f.kind == kind && f.joint == 0);
-        text += &fault_line("all servos", kind, first_joint);
-        for (joint, name) in character.joints.iter().enumerate() {
-            let who = format!("servo {} (joint {name})", character.servos[joint].id);
-            let own = single.iter().filter(|f| f.kind == kind && f.joint == joint);
-            text += &fault_line(&who, kind, own);
+        let of = |joint| move |f: &&&Fault| f.kind == kind && f.joint == joint;
+        text += &fault_line("all servos", kind, whole.iter().filter(of(Some(0))));
+        text += &fault_line("robot", kind, single.iter().filter(of(None)));
+        for joint in 0..character.joints.len() {
+            let own = single.iter().filter(of(Some(joint)));
+            text += &fault_line(&crew.name(joint), kind, own);
         }
     }
     if stats.more_faults > 0 {
@@ -188,22 +209,41 @@ fn fault_lines(report: &Report, character: &Character) -> String {
 fn fault_line<'a>(
     who: &str,
     kind: FaultKind,
-    faults: impl Iterator<Item = &'a &'a ServoFault>,
+    faults: impl Iterator<Item = &'a &'a Fault>,
 ) -> String {
     const TIMES: usize = 3;
-    let times: Vec<String> = faults
+    let faults: Vec<&&Fault> = faults.collect();
+    let Some(last) = faults.last() else {
+        return String::new();
+    };
+    let times: Vec<String> = (faults.iter().take(TIMES))
         .map(|f| match f.to_s {
+            Some(to) if to == f.from_s => format!("{to:.3} s"),
             Some(to) => format!("{:.3}..{to:.3} s", f.from_s),
             None => format!("{:.3} s to the end", f.from_s),
         })
         .collect();
-    let more = match times.len().saturating_sub(TIMES) {
-        _ if times.is_empty() => return String::new(),
+    let more = match faults.len().saturating_sub(TIMES) {
         0 => String::new(),
         n => format!(" and {n} more times"),
     };
-    let listed = times[..times.len().min(TIMES)].join(", ");
-    format!("fault         {who} {} {listed}{more}\n", kind.as_str())
+    let label = if kind == FaultKind::Rearmed {
+        "note "
+    } else {
+        "fault"
+    };
+    let mut text = format!(
+        "{label}         {who} {} {}{more}",
+        kind.as_str(),
+        times.join(", ")
+    );
+    if let Some(measured) = measured(last) {
+        text += &format!(" ({measured})");
+    }
+    if !kind.advice().is_empty() {
+        text += &format!(". {}", kind.advice());
+    }
+    text + "\n"
 }
 
 /// Why samples were dropped, and how many.

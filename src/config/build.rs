@@ -189,7 +189,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         })?,
         None => EstimatorKind::default(),
     };
-    let safety = &file.safety;
+    let safety = Safety::of(&file.safety, &gestures, &at)?;
     let front_options = FrontEndOptions {
         estimator,
         lambda: file.input.window,
@@ -203,7 +203,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         front_options,
         gesture_texts: (paths, texts),
         reload: file.input.reload,
-        safety: Safety::of(safety),
+        safety,
         bus: wire.bus,
         sim_baud: wire.baud,
         rate_hz: wire.rate_hz,

@@ -5,7 +5,7 @@ mod robot;
 mod safety;
 
 pub use robot::{BusEntry, JointEntry, RobotEntry};
-pub use safety::{OnExit, OnLost, OnServoFault, SafetyEntry};
+pub use safety::{OnBusLost, OnExit, OnLost, OnOverrun, OnServoFault, Rearm, SafetyEntry};
 
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -13,6 +13,7 @@ pub mod keys;
 pub mod realtime;
 pub mod record;
 pub mod reload;
+pub mod safety;
 pub mod session;
 pub mod source;
 pub mod stats;

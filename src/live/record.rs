@@ -1,5 +1,6 @@
 //! What one control cycle shows to those who look on: targets, states, gestures, graph, bus.
 
+use super::safety::ServoState;
 use crate::base::JointState;
 use crate::body::RootPose;
 use crate::bus::CycleReport;
@@ -46,6 +47,12 @@ pub struct CycleRecord {
     pub poses_lost: bool,
     /// What the bus saw.
     pub bus: CycleReport,
+    /// How the robot stands, as supervision sees it.
+    pub robot: ServoState,
+    /// How much of the motion supervision lets through, 0..1.
+    pub vigour: f64,
+    /// Servos wait for an operator to re-arm them.
+    pub waits: bool,
     /// Lateness of the cycle's start, microseconds.
     pub late_us: u64,
     /// Time to compute the step, microseconds.

@@ -6,11 +6,12 @@ use super::feed::{ReaderFeed, read_ahead};
 use super::realtime::{self, RealTime};
 use super::record::{CycleRecord, Inline, record_queue};
 use super::reload::{self, News, Watcher};
+use super::safety::Policy;
 use super::stats::Stats;
 use super::stop::StopSwitch;
 use crate::base::{Clock, Time, VirtualClock};
 use crate::bus::{BusError, ServoBus, TorqueReport};
-use crate::config::file::{OnExit, OnLost, OnServoFault};
+use crate::config::file::{OnExit, OnLost};
 use crate::config::{Character, ConfigError, GestureFiles};
 use crate::gesture::{FrontEnd, FrontEndError, TrackingCounts};
 use crate::motion::graph::TransitionCounts;
@@ -123,11 +124,22 @@ pub fn control_options(
     rate_hz: f64,
     duration_s: Option<f64>,
 ) -> ControlOptions {
+    let safety = &character.safety;
     ControlOptions {
         rate_hz,
         duration_s,
-        torque_off_at_end: character.safety.on_exit == OnExit::TorqueOff,
-        stop_on_servo_fault: character.safety.on_servo_fault == OnServoFault::Stop,
+        torque_off_at_end: safety.on_exit == OnExit::TorqueOff,
+        on_bus_lost: safety.on_bus_lost.unwrap_or_default(),
+        stop_gesture: (safety.stop_gesture.as_ref())
+            .and_then(|gesture| character.gestures.index_of(&gesture.name)),
+        policy: Policy {
+            supervision: safety.supervision,
+            on_servo_fault: safety.on_servo_fault,
+            rearm: safety.rearm,
+            on_overrun: safety.on_overrun,
+            stop_gesture: safety.stop_gesture.clone(),
+        },
+        ids: character.servos.iter().map(|servo| servo.id).collect(),
     }
 }
 
@@ -306,6 +318,6 @@ fn report(
         pose_error,
         records_lost,
         real_time,
-        notes: bus.notes().to_vec(),
+        notes: [bus.notes(), &outcome.notes].concat(),
     }
 }

@@ -1,44 +1,24 @@
 //! What a run measured: cycle counts, latencies, faults. Filled without allocation, printed at the end.
 
+use super::safety::{Change, FaultKind};
 use crate::bus::CycleReport;
 use hdrhistogram::Histogram;
 
-/// A fault of one servo, with times since the start of the run.
+/// A fault of one servo or of the robot, with times since the start of the run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ServoFault {
-    /// Index of the joint.
-    pub joint: usize,
-    /// What it did.
+pub struct Fault {
+    /// Index of the joint; `None` for the robot as a whole.
+    pub joint: Option<usize>,
+    /// What went wrong.
     pub kind: FaultKind,
     /// First cycle, seconds.
     pub from_s: f64,
-    /// First healthy cycle, seconds; `None` when it lasted to the end.
+    /// First healthy cycle, or when it was taken back, seconds; `None` when it lasted to the end.
     pub to_s: Option<f64>,
-}
-
-/// What a servo did wrong.
-#[derive(Copy, Clone, Debug, PartialEq, Eq)]
-pub enum FaultKind {
-    /// No valid answer.
-    Silent,
-    /// The answer carried the alert flag: a hardware error is latched.
-    Alert,
-    /// The servo came back without torque and is not driven.
-    Torqueless,
-}
-
-impl FaultKind {
-    /// All kinds, in the order in which [`Stats::bus`] keeps them.
-    pub const ALL: [FaultKind; 3] = [FaultKind::Silent, FaultKind::Alert, FaultKind::Torqueless];
-
-    /// For messages.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            FaultKind::Silent => "silent",
-            FaultKind::Alert => "hardware error",
-            FaultKind::Torqueless => "without torque",
-        }
-    }
+    /// What was measured, in the kind's unit; 0 when nothing was.
+    pub value: f64,
+    /// Its limit; 0 when there is none.
+    pub limit: f64,
 }
 
 /// Percentiles of a quantity in microseconds.
@@ -116,10 +96,10 @@ pub struct Stats {
     /// From a sample's arrival to the last goal byte handed to the port.
     pub pose_to_wire: Microseconds,
     /// Faults, oldest first.
-    pub faults: Vec<ServoFault>,
+    pub faults: Vec<Fault>,
     /// Faults beyond those kept.
     pub more_faults: u64,
-    open: [u64; FaultKind::ALL.len()],
+    silent_mask: u64,
 }
 
 /// Faults kept with their times; more are only counted.
@@ -143,7 +123,7 @@ impl Default for Stats {
             pose_to_wire: Microseconds::default(),
             faults: Vec::with_capacity(FAULTS_KEPT),
             more_faults: 0,
-            open: [0; FaultKind::ALL.len()],
+            silent_mask: 0,
         }
     }
 }
@@ -155,41 +135,45 @@ impl Stats {
         self.damaged += u64::from(report.damaged);
         self.bytes += u64::from(report.bytes);
         self.exchange.add(u64::from(report.cycle_us));
-        let masks = [
-            report.silent_mask,
-            report.alert_mask,
-            report.torqueless_mask,
-        ];
-        for (slot, (kind, mask)) in FaultKind::ALL.into_iter().zip(masks).enumerate() {
-            let mut changed = mask ^ self.open[slot];
-            self.open[slot] = mask;
-            while changed != 0 {
-                let joint = changed.trailing_zeros() as usize;
-                changed &= changed - 1;
-                self.change(t_s, joint, kind, mask >> joint & 1 == 1);
-            }
+        let mut changed = report.silent_mask ^ self.silent_mask;
+        self.silent_mask = report.silent_mask;
+        while changed != 0 {
+            let joint = changed.trailing_zeros() as usize;
+            changed &= changed - 1;
+            self.change(
+                t_s,
+                &Change {
+                    kind: FaultKind::Silent,
+                    joint: Some(joint),
+                    begins: report.silent_mask >> joint & 1 == 1,
+                    value: 0.0,
+                    limit: 0.0,
+                },
+            );
         }
     }
 
-    fn change(&mut self, t_s: f64, joint: usize, kind: FaultKind, begins: bool) {
-        if !begins {
-            let open = self
-                .faults
-                .iter_mut()
-                .rev()
-                .find(|f| f.joint == joint && f.kind == kind && f.to_s.is_none());
-            if let Some(fault) = open {
-                fault.to_s = Some(t_s);
-            }
-        } else if self.faults.len() < FAULTS_KEPT {
-            self.faults.push(ServoFault {
-                joint,
-                kind,
+    /// Notes what began or ended at `t_s`; a fault that is open learns its value.
+    pub fn change(&mut self, t_s: f64, change: &Change) {
+        let room = self.faults.len() < FAULTS_KEPT;
+        let open = self
+            .faults
+            .iter_mut()
+            .rev()
+            .find(|f| f.joint == change.joint && f.kind == change.kind && f.to_s.is_none());
+        match (open, change.begins) {
+            (Some(fault), false) => fault.to_s = Some(t_s),
+            (Some(fault), true) => (fault.value, fault.limit) = (change.value, change.limit),
+            (None, false) => {}
+            (None, true) if room => self.faults.push(Fault {
+                joint: change.joint,
+                kind: change.kind,
                 from_s: t_s,
                 to_s: None,
-            });
-        } else {
-            self.more_faults += 1;
+                value: change.value,
+                limit: change.limit,
+            }),
+            (None, true) => self.more_faults += 1,
         }
     }
 }
@@ -213,6 +197,6 @@ mod tests {
             .iter()
             .map(|f| (f.joint, f.from_s, f.to_s))
             .collect();
-        assert_eq!(times, [(2, 0.5, Some(0.7)), (0, 0.8, None)]);
+        assert_eq!(times, [(Some(2), 0.5, Some(0.7)), (Some(0), 0.8, None)]);
     }
 }

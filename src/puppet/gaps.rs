@@ -51,6 +51,8 @@ pub(super) struct Join {
     joining: bool,
     /// For how long at least, seconds.
     leisure_s: f64,
+    /// Time by which the puppet's own fell behind in this step while poses came, seconds.
+    behind_s: f64,
 }
 
 /// Poses that have been missing for this long have left a gap, seconds: estimators may jump after it.
@@ -71,6 +73,11 @@ impl Join {
         self.leisure_s = FREQUENCY_JOIN.1;
     }
 
+    /// The puppet's own time fell behind by `seconds` in this step while the gesture went on.
+    pub fn fall_behind(&mut self, seconds: f64) {
+        self.behind_s = seconds;
+    }
+
     /// Frequency and phase for a class that does or does not move now.
     pub fn step(
         &mut self,
@@ -79,8 +86,13 @@ impl Join {
         moving: bool,
         dt_s: f64,
     ) -> (f64, f64) {
-        let jump = wrap_pi(wave.phase_rad - self.phase_rad - TAU * wave.frequency_hz * dt_s);
+        let behind_s = std::mem::take(&mut self.behind_s);
+        let passed_s = dt_s + behind_s;
+        let jump = wrap_pi(wave.phase_rad - self.phase_rad - TAU * wave.frequency_hz * passed_s);
         self.phase_rad = wave.phase_rad;
+        if behind_s > 0.0 {
+            self.offset.value = wrap_pi(self.offset.value - TAU * wave.frequency_hz * behind_s);
+        }
         if !moving {
             *self = Self {
                 phase_rad: wave.phase_rad,

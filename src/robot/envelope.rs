@@ -28,6 +28,8 @@ pub struct Envelope {
     limits: Vec<JointEnvelope>,
     joints: Vec<JointMotion>,
     dt_s: f64,
+    /// Share of the velocity limits in use, 0..1.
+    pace: f64,
 }
 
 #[derive(Copy, Clone, Debug, Default)]
@@ -51,12 +53,19 @@ impl Envelope {
             limits,
             joints,
             dt_s,
+            pace: 1.0,
         }
     }
 
     /// The limits, in joint order.
     pub fn limits(&self) -> &[JointEnvelope] {
         &self.limits
+    }
+
+    /// Uses this share of every velocity limit from the next step on, 0..1. A joint that is faster brakes
+    /// within its acceleration.
+    pub fn set_pace(&mut self, share: f64) {
+        self.pace = share.clamp(0.0, 1.0);
     }
 
     /// Starts at rest from `present` (rad, joint order). A position outside the limits is kept;
@@ -85,7 +94,13 @@ impl Envelope {
             .zip(targets)
             .zip(out)
         {
-            let acted = joint.step(limit, *target, dt);
+            let acted = if self.pace < 1.0 {
+                let slowed = (joint.velocity.abs() - limit.acceleration * dt).max(0.0);
+                let velocity = (self.pace * limit.velocity).max(slowed);
+                joint.step(&JointEnvelope { velocity, ..*limit }, *target, dt)
+            } else {
+                joint.step(limit, *target, dt)
+            };
             held_back += usize::from(acted);
             *out = joint.position;
         }

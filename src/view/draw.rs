@@ -245,6 +245,8 @@ fn bus_lines(watch: &Watch, record: &CycleRecord) -> Vec<Line<'static>> {
         record.stage,
         Stage::Playing | Stage::Rising | Stage::Lowering | Stage::Done
     ) && !record.poses_lost
+        && !record.waits
+        && record.vigour > 0.995
         && record.bus.silent_mask == 0
         && record.bus.alert_mask == 0;
     let state = safety(record);

@@ -37,7 +37,8 @@ impl Terminal {
         self.watch.count(record);
     }
 
-    /// Draws the newest cycle and handles keys: q, Esc and Ctrl-C press the stop switch.
+    /// Draws the newest cycle and handles keys: q, Esc and Ctrl-C press the stop switch, r asks for a
+    /// re-arm.
     pub fn draw(&mut self, record: &CycleRecord) {
         while event::poll(Duration::ZERO).unwrap_or(false) {
             if let Ok(Event::Key(key)) = event::read() {
@@ -47,6 +48,9 @@ impl Terminal {
                     && (ctrl_c || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc))
                 {
                     self.stop.press();
+                }
+                if key.is_press() && key.code == KeyCode::Char('r') {
+                    self.stop.ask_rearm();
                 }
             }
         }

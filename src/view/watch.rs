@@ -2,6 +2,7 @@
 
 use crate::config::Character;
 use crate::live::CycleRecord;
+use crate::live::safety::ServoState;
 use crate::live::stats::{Microseconds, Percentiles};
 use crate::puppet::Stage;
 
@@ -105,6 +106,14 @@ pub fn safety(record: &CycleRecord) -> String {
         Stage::Done => "at rest",
     };
     let mut text = stage.to_string();
+    if record.waits {
+        text += ", SERVOS WAIT: LOOK AT THE ROBOT, THEN r TO RE-ARM";
+    } else if matches!(record.robot, ServoState::Faulted | ServoState::Offline) {
+        text += &format!(", ROBOT {}", record.robot.as_str().to_uppercase());
+    }
+    if record.vigour < 0.995 {
+        text += &format!(", MOTION AT {:.0} %", 100.0 * record.vigour);
+    }
     if record.poses_lost {
         text += ", POSES LOST";
     }
