@@ -95,6 +95,7 @@ impl Bench {
             upper: 3.0,
             velocity: SPEED,
             acceleration: ACCELERATION,
+            jerk: f64::INFINITY,
         };
         Self {
             animator: Animator::new(space, nodes, graph, Vec::new(), &ranges()),

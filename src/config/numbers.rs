@@ -1,7 +1,7 @@
 //! The ranges of the numbers of a configuration that stand alone.
 
 use super::error::{ConfigError, Pointer};
-use super::file::CharacterFile;
+use super::file::{CharacterFile, RobotEntry};
 
 /// Checks that every number lies in its range; the error names the key and what is allowed.
 pub(super) fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<(), ConfigError> {
@@ -15,6 +15,18 @@ pub(super) fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<()
             robot.map(|r| r.acceleration_rad_s2),
             1.0,
             1e5,
+        ),
+        (
+            "robot.jerk_rad_s3",
+            robot.and_then(|r| r.jerk_rad_s3),
+            100.0,
+            1e8,
+        ),
+        (
+            "robot.joint.jerk_rad_s3",
+            robot.and_then(least_jerk),
+            100.0,
+            1e8,
         ),
         (
             "robot.velocity_share",
@@ -117,4 +129,10 @@ pub(super) fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<()
         }
     }
     Ok(())
+}
+
+/// The least jerk of a joint of its own; NaN counts as least.
+fn least_jerk(robot: &RobotEntry) -> Option<f64> {
+    let own = robot.joint.iter().filter_map(|j| j.jerk_rad_s3);
+    own.min_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Less))
 }

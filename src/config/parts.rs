@@ -80,6 +80,7 @@ const FREE: JointEnvelope = JointEnvelope {
     upper: 1e9,
     velocity: 1e9,
     acceleration: 1e12,
+    jerk: f64::INFINITY,
 };
 
 fn avatar_parts(
@@ -105,14 +106,20 @@ fn avatar_parts(
 }
 
 fn envelope_limits(robot: &RobotEntry, model: &RobotModel) -> Vec<JointEnvelope> {
+    let jerk = |name: &String| {
+        let own = robot.joint.iter().find(|j| j.name.get_ref() == name);
+        own.and_then(|j| j.jerk_rad_s3).or(robot.jerk_rad_s3)
+    };
     model
         .limits()
         .iter()
-        .map(|l| JointEnvelope {
+        .zip(model.joint_names())
+        .map(|(l, name)| JointEnvelope {
             lower: l.lower,
             upper: l.upper,
             velocity: l.velocity * robot.velocity_share,
             acceleration: robot.acceleration_rad_s2,
+            jerk: jerk(&name).unwrap_or(f64::INFINITY),
         })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! Watches a stream of joint targets: position, velocity and acceleration inside the limits, with the extremes.
+//! Watches a stream of joint targets: position, velocity, acceleration and jerk inside the limits, with the extremes.
 
 use handwave::robot::JointEnvelope;
 
@@ -19,6 +19,7 @@ pub struct LimitWatch {
     dt_s: f64,
     last: Vec<f64>,
     velocity: Vec<f64>,
+    last_acceleration: Vec<f64>,
     cycle: usize,
     pub speed: Extreme,
     pub acceleration: Extreme,
@@ -36,6 +37,7 @@ impl LimitWatch {
             dt_s,
             last: Vec::new(),
             velocity: vec![0.0; limits.len()],
+            last_acceleration: vec![0.0; limits.len()],
             cycle: 0,
             speed: Extreme::default(),
             acceleration: Extreme::default(),
@@ -73,6 +75,11 @@ impl LimitWatch {
                     "{at}: acceleration {acceleration} rad/s^2 over {most}"
                 ));
             }
+            let jerk = (acceleration - self.last_acceleration[joint]) / self.dt_s;
+            if jerk.abs() > limit.jerk + 4.0 * slack / (self.dt_s * self.dt_s) {
+                return Err(format!("{at}: jerk {jerk} rad/s^3 over {}", limit.jerk));
+            }
+            self.last_acceleration[joint] = acceleration;
             self.room_rad = self
                 .room_rad
                 .min(position - limit.lower)

@@ -13,6 +13,8 @@ pub struct RobotEntry {
     pub urdf: Spanned<String>,
     /// Acceleration every joint may use, rad/s^2.
     pub acceleration_rad_s2: f64,
+    /// Jerk every joint may use, rad/s^3; not limited when not given.
+    pub jerk_rad_s3: Option<f64>,
     /// Share of the URDF's velocity limits to use.
     #[serde(default = "one")]
     pub velocity_share: f64,
@@ -43,6 +45,8 @@ pub struct JointEntry {
     /// Lowest and highest servo position, pulses.
     #[serde(default = "full_range")]
     pub range_pulse: Spanned<[i32; 2]>,
+    /// Jerk of this joint, rad/s^3; that of the robot when not given.
+    pub jerk_rad_s3: Option<f64>,
 }
 
 /// The bus.

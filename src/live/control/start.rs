@@ -57,10 +57,15 @@ impl<'p, 'a> Run<'p, 'a> {
     /// Servos that go on without us: those that have no watchdog of their own.
     pub(super) fn notes(&self) -> Vec<String> {
         let facts = self.parts.bus.facts();
+        let told = |id: u8| {
+            let name = format!("servo {id} ");
+            let of_it = |note: &&String| note.contains(&name) && note.contains("not protected");
+            self.parts.bus.notes().iter().any(|note| of_it(&note))
+        };
         let names: Vec<String> = facts
             .iter()
             .zip(self.parts.bus.joints())
-            .filter(|(facts, _)| facts.watchdog_s.is_none())
+            .filter(|(facts, _)| facts.watchdog_s.is_none() && !told(facts.id))
             .map(|(facts, joint)| format!("{} ({joint})", facts.id))
             .collect();
         if names.is_empty() {

@@ -41,6 +41,8 @@
 mod kind;
 mod state;
 mod supervisor;
+#[cfg(test)]
+mod tests;
 mod watch;
 mod words;
 

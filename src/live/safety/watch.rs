@@ -196,12 +196,18 @@ impl Watch {
         let effort = state.effort.abs() / self.full_effort;
         if fresh && follows {
             self.seen_at = state.measured_at;
-            let step = |sum: &mut f64, so: bool| *sum = if so { *sum + dt_s } else { 0.0 };
-            step(&mut self.over_s, error > settings.following_error_rad);
-            let pushes = effort >= settings.stall_effort
-                && state.velocity.abs() < STANDING_RAD_S
-                && (target - state.position).abs() > ARRIVED_RAD;
-            step(&mut self.stalled_s, pushes);
+            let step = |sum: f64, so: bool| (sum + if so { dt_s } else { -dt_s }).max(0.0);
+            self.over_s = step(self.over_s, error > settings.following_error_rad);
+            // A target that goes to and fro pulls at a blocked joint now and then only: what counts is that it
+            // has not moved since.
+            let stands = state.velocity.abs() < STANDING_RAD_S;
+            let pushes =
+                effort >= settings.stall_effort && (target - state.position).abs() > ARRIVED_RAD;
+            self.stalled_s = match (stands, pushes) {
+                (false, _) => 0.0,
+                (true, true) => self.stalled_s + dt_s,
+                (true, false) => self.stalled_s,
+            };
             let share = (dt_s / settings.effort_window_s.max(dt_s)).min(1.0);
             if effort.is_finite() {
                 self.mean_square += share * (effort * effort - self.mean_square);
