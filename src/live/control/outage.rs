@@ -34,7 +34,7 @@ impl Run<'_, '_> {
     /// Takes note of a lost bus, or gives the error back when the policy is to end.
     pub(super) fn lose(&mut self, error: BusError) -> Result<(), BusError> {
         // Anything else is a servo's refusal, not a lost line.
-        let lost = matches!(error, BusError::Port(_) | BusError::Lost { .. });
+        let lost = !matches!(error, BusError::Servo { .. } | BusError::Absent { .. });
         if !lost || self.options.on_bus_lost == OnBusLost::Exit {
             self.supervisor.lost();
             self.note_changes();
