@@ -1,11 +1,15 @@
 //! `handwave bus`: look at and set up the servos of a bus.
 
+mod action;
+mod backup;
+mod clear;
+mod factory_reset;
 mod ids;
 mod registers;
 mod scan;
 
 use super::{ExitStatus, Failure};
-use crate::bus::dynamixel::{self, Client, ClientError, Model};
+use crate::bus::dynamixel::{self, Backup, Client, ClientError, Model};
 use crate::bus::port::bare;
 use crate::bus::{AddressError, BusAddress};
 use crate::live::RealClock;
@@ -38,6 +42,13 @@ enum BusCommand {
     Read(registers::ReadArgs),
     Write(registers::WriteArgs),
     Reboot(RebootArgs),
+    Action(action::ActionArgs),
+    /// Let servos store their control table in themselves.
+    Backup(backup::BackupArgs),
+    /// Give servos the control table back that they stored; they restart.
+    Restore(backup::BackupArgs),
+    Clear(clear::ClearArgs),
+    FactoryReset(factory_reset::FactoryResetArgs),
 }
 
 /// Restart servos: clears a latched hardware error; torque is off afterwards.
@@ -60,6 +71,11 @@ pub fn run(args: BusArgs) -> Result<ExitStatus, Failure> {
         BusCommand::Read(args) => registers::read(&args, &mut out),
         BusCommand::Write(args) => registers::write(&args, &mut out),
         BusCommand::Reboot(args) => reboot(&args, &mut out),
+        BusCommand::Action(args) => action::action(&args, &mut out),
+        BusCommand::Backup(args) => backup::backup(&args, Backup::Store, &mut out),
+        BusCommand::Restore(args) => backup::backup(&args, Backup::Restore, &mut out),
+        BusCommand::Clear(args) => clear::clear(&args, &mut out),
+        BusCommand::FactoryReset(args) => factory_reset::factory_reset(&args, &mut out),
     }
 }
 

@@ -7,9 +7,13 @@
 
 use super::allowance::Allowance;
 use super::client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
+use super::group_read::Asked;
 use crate::base::Time;
 use crate::bus::port::Port;
-use handwave_dynamixel::lists::encode_sync_write;
+use handwave_dynamixel::instruction::{
+    Backup, BulkReadEntry, BulkWriteEntry, FactoryReset, SyncRead,
+};
+use handwave_dynamixel::lists::{encode_bulk_write, encode_sync_write};
 use handwave_dynamixel::{
     BROADCAST_ID, BufferTooSmall, ErrorCode, FrameParser, Instruction, MAX_ID, Status, wire,
 };
@@ -124,10 +128,9 @@ impl Master {
         self.line_free_at + self.return_delay * delays + self.wire_time(bytes)
     }
 
-    /// Until when the next part of an answer due at `due` is waited for, when `behind` servos would be
-    /// asked again if it does not come and answer with `answer_bytes` in all.
-    pub(super) fn deadline(&self, due: Time, behind: usize, answer_bytes: usize) -> Time {
-        let again = wire::sync_read(behind) + answer_bytes;
+    /// Until when the next part of an answer due at `due` is waited for, when asking the servos behind it
+    /// again would take `again` bytes, there and back.
+    pub(super) fn deadline(&self, due: Time, again: usize) -> Time {
         let spare = self
             .cycle_end
             .map(|end| end - self.wire_time(again) - SPARE_MARGIN);
@@ -174,6 +177,15 @@ impl Master {
             self.received += count as u64;
             self.parser.push(&chunk[..count]);
         }
+    }
+
+    /// Sends an instruction that is answered without data; to the broadcast id nobody answers.
+    fn command(&mut self, id: u8, instruction: &Instruction<'_>) -> Result<Reply, ClientError> {
+        self.send(|buf| instruction.encode(id, buf))?;
+        if id == BROADCAST_ID {
+            return Ok(Reply::default());
+        }
+        self.answer(id, &mut [])
     }
 
     /// Waits for the answer of `id` to the request just sent.
@@ -332,19 +344,31 @@ impl Client for Master {
     }
 
     fn write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError> {
-        self.send(|buf| Instruction::Write { address, data }.encode(id, buf))?;
-        if id == BROADCAST_ID {
-            return Ok(Reply::default());
-        }
-        self.answer(id, &mut [])
+        self.command(id, &Instruction::Write { address, data })
     }
 
     fn reboot(&mut self, id: u8) -> Result<Reply, ClientError> {
-        self.send(|buf| Instruction::Reboot.encode(id, buf))?;
-        if id == BROADCAST_ID {
-            return Ok(Reply::default());
-        }
-        self.answer(id, &mut [])
+        self.command(id, &Instruction::Reboot)
+    }
+
+    fn reg_write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError> {
+        self.command(id, &Instruction::RegWrite { address, data })
+    }
+
+    fn action(&mut self, id: u8) -> Result<Reply, ClientError> {
+        self.command(id, &Instruction::Action)
+    }
+
+    fn clear_multi_turn(&mut self, id: u8) -> Result<Reply, ClientError> {
+        self.command(id, &Instruction::ClearMultiTurn)
+    }
+
+    fn back_up(&mut self, id: u8, what: Backup) -> Result<Reply, ClientError> {
+        self.command(id, &Instruction::Backup(what))
+    }
+
+    fn factory_reset(&mut self, id: u8, what: FactoryReset) -> Result<Reply, ClientError> {
+        self.command(id, &Instruction::FactoryReset(what))
     }
 
     fn sync_write(
@@ -359,6 +383,11 @@ impl Client for Master {
         self.send(|buf| encode_sync_write(buf, address, length, items))
     }
 
+    fn bulk_write(&mut self, entries: &[BulkWriteEntry<'_>]) -> Result<(), ClientError> {
+        once_each(entries.iter().map(|entry| entry.id))?;
+        self.send(|buf| encode_bulk_write(buf, entries.iter().copied()))
+    }
+
     fn sync_read(
         &mut self,
         address: u16,
@@ -367,7 +396,12 @@ impl Client for Master {
         data: &mut [u8],
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
-        self.read_in_turn(address, length, ids, data, outcomes)
+        let list = SyncRead {
+            address,
+            length,
+            ids,
+        };
+        self.read_in_turn(Asked::Sync(list), data, outcomes)
     }
 
     fn fast_sync_read(
@@ -378,6 +412,42 @@ impl Client for Master {
         data: &mut [u8],
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
-        self.read_combined(address, length, ids, data, outcomes)
+        let list = SyncRead {
+            address,
+            length,
+            ids,
+        };
+        self.read_combined(Asked::Sync(list), data, outcomes)
     }
+
+    fn bulk_read(
+        &mut self,
+        entries: &[BulkReadEntry],
+        data: &mut [u8],
+        outcomes: &mut [Outcome],
+    ) -> Result<(), ClientError> {
+        once_each(entries.iter().map(|entry| entry.id))?;
+        self.read_in_turn(Asked::Bulk(entries), data, outcomes)
+    }
+
+    fn fast_bulk_read(
+        &mut self,
+        entries: &[BulkReadEntry],
+        data: &mut [u8],
+        outcomes: &mut [Outcome],
+    ) -> Result<(), ClientError> {
+        once_each(entries.iter().map(|entry| entry.id))?;
+        self.read_combined(Asked::Bulk(entries), data, outcomes)
+    }
+}
+
+/// A servo acts on its first entry of a bulk instruction only, and waits in vain for its second turn.
+fn once_each(ids: impl Iterator<Item = u8>) -> Result<(), ClientError> {
+    let mut seen = [false; 256];
+    for id in ids {
+        if std::mem::replace(&mut seen[usize::from(id)], true) {
+            return Err(ClientError::TwiceInList { id });
+        }
+    }
+    Ok(())
 }

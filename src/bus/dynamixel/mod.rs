@@ -26,6 +26,7 @@ mod tests;
 pub use backend_dynamixel2::Dynamixel2Client;
 pub use chain::{ChainOptions, DynamixelChain};
 pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
+pub use handwave_dynamixel::instruction::{Backup, BulkReadEntry, BulkWriteEntry, FactoryReset};
 pub use master::{Master, MasterOptions};
 pub use model::{Model, Protocol, Register};
 pub use servo::{Direction, ServoSpec, SpecError};
