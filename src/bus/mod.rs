@@ -3,6 +3,7 @@
 //! [`port`] is the seam to the wire (serial port, simulated line), [`dynamixel`] speaks the
 //! protocol over it, [`ServoBus`] is all that the live loop knows.
 
+mod adapter;
 pub mod address;
 pub mod dynamixel;
 mod no_servos;
@@ -193,6 +194,28 @@ pub enum BusError {
         problem: String,
         /// What to do.
         advice: String,
+    },
+    /// A lost bus was looked for and is not back.
+    #[error(
+        "bus {bus} is not back. Looked for {sought}: {found}. Plug it in again; nothing moves until it is armed anew"
+    )]
+    NotBack {
+        /// The bus as written on the command line.
+        bus: String,
+        /// What it is recognised by.
+        sought: String,
+        /// What is there instead, and why that is not it.
+        found: String,
+    },
+    /// One of several buses failed; the others can go on.
+    #[error("bus {name} (joints {}): {source}", joints.join(", "))]
+    OnBus {
+        /// Its name in the configuration.
+        name: String,
+        /// The joints on it.
+        joints: Vec<String>,
+        /// What happened there.
+        source: Box<BusError>,
     },
     /// No servo answered for so long that the bus counts as lost.
     #[error(

@@ -14,6 +14,8 @@ pub struct SimPort {
     line: SharedLine,
     clock: Arc<dyn Clock>,
     baud: u32,
+    /// Lost, and not opened again since.
+    gone: bool,
 }
 
 impl SimPort {
@@ -23,16 +25,19 @@ impl SimPort {
             line,
             clock,
             baud: baud_bps,
+            gone: false,
         }
     }
 
-    fn check(&self, now: Time) -> Result<(), PortError> {
+    fn check(&mut self, now: Time) -> Result<(), PortError> {
         let mut line = self.line.lock();
-        if !line.is_unplugged(now) {
+        if !self.gone && !line.is_unplugged(now) {
             return Ok(());
         }
         line.advance(now);
         line.clear();
+        self.gone = true;
+        drop(line);
         Err(PortError::Gone {
             port: self.name().to_owned(),
             reason: "unplugged by an injected fault".to_owned(),
@@ -101,5 +106,19 @@ impl Port for SimPort {
         let mut waste = [0; 64];
         while line.receive(now, &mut waste) > 0 {}
         Ok(())
+    }
+
+    fn candidates(&self) -> Vec<String> {
+        vec![self.name().to_owned()]
+    }
+
+    /// It comes back under its own name, once it is plugged in again.
+    fn reopen(&mut self, _: &str) -> Result<(), PortError> {
+        self.gone = false;
+        self.check(self.clock.now())
+    }
+
+    fn close(&mut self) {
+        self.gone = true;
     }
 }

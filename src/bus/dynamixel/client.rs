@@ -151,6 +151,30 @@ pub trait Client: Send {
     fn set_return_delay(&mut self, delay: Duration);
     /// How long beyond its wire time an answer is waited for at present.
     fn patience(&self) -> Duration;
+    /// How late beyond its wire time an answer comes as a rule: return delay, and a turn of adapter and
+    /// system as measured.
+    fn lateness(&self) -> Duration {
+        self.patience()
+    }
+    /// What is worth telling of the port, such as a setting of its adapter that costs time.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+    /// Names under which a lost port may be found; see [`Port::candidates`](crate::bus::Port::candidates).
+    fn port_candidates(&self) -> Vec<String> {
+        Vec::new()
+    }
+    /// What a lost port is recognised by, for messages.
+    fn port_sought(&self) -> String {
+        self.port_name().to_owned()
+    }
+    /// Opens the port `name` in place of the one it has.
+    fn reopen_port(&mut self, name: &str) -> Result<(), ClientError> {
+        let _ = name;
+        Err(self.unsupported("open a lost port again"))
+    }
+    /// Lets go of the port until it is reopened.
+    fn close_port(&mut self) {}
     /// Tells when the control cycle ends, or that none is on. Within a cycle a late answer is waited
     /// for as long as the servos behind it could still be asked again: that time has no other use.
     fn set_cycle_end(&mut self, end: Option<Time>) {
@@ -170,6 +194,17 @@ pub trait Client: Send {
     fn ping_all(&mut self, found: &mut dyn FnMut(Ping)) -> Result<(), ClientError>;
     /// Reads `data.len()` bytes from `address`.
     fn read(&mut self, id: u8, address: u16, data: &mut [u8]) -> Result<Reply, ClientError>;
+    /// The same, given up at `latest` at the latest.
+    fn read_by(
+        &mut self,
+        id: u8,
+        address: u16,
+        data: &mut [u8],
+        latest: Time,
+    ) -> Result<Reply, ClientError> {
+        let _ = latest;
+        self.read(id, address, data)
+    }
     /// Writes `data` to `address`. To the broadcast id nobody answers, and the call returns at once.
     fn write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError>;
     /// Restarts a servo.

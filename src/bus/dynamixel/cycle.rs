@@ -56,6 +56,7 @@ impl DynamixelChain {
         self.client.set_cycle_end(None);
         read?;
         self.retry_one(begin)?;
+        self.look_after_health(begin, report.alert_mask)?;
 
         let now = self.client.now();
         if report.fresh > 0 {

@@ -148,7 +148,7 @@ impl Master {
             };
             if !answered {
                 outcomes[turn] = missing;
-                self.allowance.missed(turn == 0);
+                self.missed(due, turn == 0);
                 return Ok(());
             }
             for passed in &mut outcomes[turn..heard.max(turn)] {
@@ -249,7 +249,8 @@ impl Master {
             let coming = (asked.blocks_in(got) + 1).min(servos);
             let behind = servos - coming;
             let again = asked.request(behind) + wire::fast_status(behind, 0) + asked.rest(coming);
-            let deadline = self.deadline(self.due(1, asked.combined(coming)), again);
+            let due = self.due(1, asked.combined(coming));
+            let deadline = self.deadline(due, again);
             let rest = (total - got).min(FAST_BYTES - filled);
             let place = &mut self.combined[filled..filled + rest];
             let mut count = self.port.read(place, rest, deadline)?;
@@ -259,7 +260,7 @@ impl Master {
                 count = self.port.read(place, rest, grace)?;
             }
             if count == 0 {
-                self.allowance.missed(filled == 0);
+                self.missed(due, filled == 0);
                 return Ok(filled);
             }
             filled += count;

@@ -5,6 +5,7 @@
 //! `dynamixel2` crate as a second implementation (feature `dxl-serial2`); [`model`] says
 //! what the registers mean; [`DynamixelChain`] is the [`ServoBus`](super::ServoBus) in joint angles.
 
+mod absence;
 mod allowance;
 #[cfg(feature = "dxl-serial2")]
 pub mod backend_dynamixel2;
@@ -13,9 +14,12 @@ mod check;
 pub mod client;
 mod cycle;
 mod group_read;
+mod health;
 pub mod master;
 pub mod model;
 mod recovery;
+mod reopen;
+mod requests;
 #[cfg(test)]
 mod scripted;
 pub mod servo;
@@ -53,9 +57,10 @@ pub fn open(
         DynamixelBackend::Handwave => {
             let port = SerialPort::open(path, baud, clock)?;
             let mut options = MasterOptions::default();
-            options.max_allowance += port.latency_timer().unwrap_or_default();
+            options.first_allowance += port.latency_timer().unwrap_or_default();
+            let notes = port.latency_note().into_iter().collect();
             let port = wrap(&format!("dynamixel:{path}@{baud}"), Box::new(port));
-            Ok(Box::new(Master::new(port, options)))
+            Ok(Box::new(Master::new(port, options).with_notes(notes)))
         }
         #[cfg(feature = "dxl-serial2")]
         DynamixelBackend::Dynamixel2 => Ok(Box::new(Dynamixel2Client::open(path, baud, clock)?)),
