@@ -7,12 +7,14 @@ mod adapter;
 pub mod address;
 pub mod dynamixel;
 mod no_servos;
+pub mod parallel;
 pub mod port;
 pub mod serial;
 
 use crate::base::{JointState, Time};
-pub use address::{AddressError, BusAddress, DynamixelBackend};
+pub use address::{AddressError, BusAddress, BusChoice, BusLine, Buses, DynamixelBackend};
 pub use no_servos::NoServos;
+pub use parallel::ParallelBus;
 pub use port::{Port, PortError};
 pub use serial::SerialPort;
 

@@ -1,33 +1,37 @@
 //! The joint map: which servo moves which joint, checked against the URDF's limits.
 
+use super::buses::bus_of;
 use super::error::{ConfigError, Pointer};
 use super::file::{BusEntry, JointEntry, RobotEntry};
 use crate::base::suggest::hint;
 use crate::bus::dynamixel::{Direction, Model, ServoSpec};
 use crate::robot::RobotModel;
 
-/// Servos in model order; every moving joint has exactly one.
+/// Servos in model order with the bus that each hangs on; every moving joint has exactly one.
 pub(super) fn servo_map(
     robot: &RobotEntry,
-    bus: &BusEntry,
+    buses: &[BusEntry],
     model: &RobotModel,
     at: &Pointer<'_>,
-) -> Result<Vec<ServoSpec>, ConfigError> {
+) -> Result<Vec<(ServoSpec, usize)>, ConfigError> {
     let joints = model.joint_names();
-    let servo_model = Model::by_name(bus.model.get_ref()).ok_or_else(|| {
-        let names: Vec<&str> = crate::bus::dynamixel::model::MODELS
-            .iter()
-            .map(|m| m.name)
-            .collect();
-        at.key(
-            "bus.model",
-            format!(
-                "unknown servo model {:?}. Allowed: {}",
-                bus.model.get_ref(),
-                names.join(", ")
-            ),
-        )
-    })?;
+    let servo_models = buses.iter().map(|bus| {
+        Model::by_name(bus.model.get_ref()).ok_or_else(|| {
+            let names: Vec<&str> = crate::bus::dynamixel::model::MODELS
+                .iter()
+                .map(|m| m.name)
+                .collect();
+            at.key(
+                "bus.model",
+                format!(
+                    "unknown servo model {:?}. Allowed: {}",
+                    bus.model.get_ref(),
+                    names.join(", ")
+                ),
+            )
+        })
+    });
+    let servo_models = servo_models.collect::<Result<Vec<_>, _>>()?;
     let mut by_joint: Vec<Option<&JointEntry>> = vec![None; joints.len()];
     for entry in &robot.joint {
         let name = entry.name.get_ref();
@@ -46,7 +50,7 @@ pub(super) fn servo_map(
         if let Some(other) = by_joint
             .iter()
             .flatten()
-            .find(|o| o.servo.get_ref() == entry.servo.get_ref())
+            .find(|o| o.servo.get_ref() == entry.servo.get_ref() && o.bus() == entry.bus())
         {
             return Err(at.at(
                 entry.servo.span(),
@@ -77,7 +81,10 @@ pub(super) fn servo_map(
                     format!("joint {joint} has no servo; add {{ name = \"{joint}\", servo = ID }}"),
                 )
             })?;
-            servo_spec(entry, joint, servo_model, (limit.lower, limit.upper), at)
+            let bus = bus_of(entry, buses, at)?;
+            let limits = (limit.lower, limit.upper);
+            let spec = servo_spec(entry, joint, servo_models[bus], limits, at)?;
+            Ok((spec, bus))
         })
         .collect()
 }

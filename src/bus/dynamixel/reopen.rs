@@ -73,7 +73,7 @@ impl DynamixelChain {
         ))
     }
 
-    /// Nothing of what was known of torque and fast reads holds any more.
+    /// Nothing of what was known of torque holds any more.
     fn begin_anew(&mut self, port: &str) {
         let now = self.client.now();
         if self.options.bus.starts_with("dynamixel:") {
@@ -86,7 +86,6 @@ impl DynamixelChain {
             servo.retry_at = now;
             servo.retry_after = Duration::ZERO;
         }
-        (self.fast_failures, self.fast_in_doubt, self.fast_works) = (0, false, false);
         self.was_mute = false;
         self.last_heard = now;
         self.last_cycle = None;
