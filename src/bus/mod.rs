@@ -145,7 +145,8 @@ pub struct CycleReport {
     pub ramping_mask: u64,
     /// Damaged frames, wrong checksums and stray bytes seen.
     pub damaged: u16,
-    /// Bytes sent and received, for the wire budget.
+    /// Bytes sent and received, for the wire budget. Readings of [`ServoBus::health`], which take what is left of
+    /// a cycle, are not in it, nor in the times below.
     pub bytes: u32,
     /// Time from the first byte handed out to the last reply (or given up), in microseconds.
     pub cycle_us: u32,

@@ -345,6 +345,3 @@ impl ServoBus for ParallelBus {
 fn later(a: Option<Time>, b: Time) -> Time {
     a.map_or(b, |a| a.max(b))
 }
-
-#[cfg(test)]
-mod tests;
