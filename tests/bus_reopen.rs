@@ -9,7 +9,7 @@ use handwave::bus::{BusError, ServoBus};
 use handwave::live::RealClock;
 use handwave::sim::line::SharedLine;
 use handwave::sim::models::XL430_W250;
-use handwave::sim::{Line, LineOptions, PtyServer, Servo};
+use handwave::sim::{Line, LineOptions, PtyServer};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -118,7 +118,9 @@ impl Bench {
     }
 
     fn goal(&self, id: u8) -> u32 {
-        let line = self.line.lock();
+        let mut line = self.line.lock();
+        // Watchdogs that have run out meanwhile act when time moves on.
+        line.advance(self.clock.now());
         line.servo(id).expect("a servo").register(116)
     }
 }
@@ -136,11 +138,16 @@ fn a_chain_is_found_under_another_name_and_nothing_moves_until_it_is_armed() {
     for part in ["is not back", "/servos* with servos 1,2,3", "there is none"] {
         assert!(text.contains(part), "{part} is not in: {text}");
     }
-    let goals: Vec<u32> = (1..=3).map(|id| bench.goal(id)).collect();
     let plug = Plug::in_at(&bench.line, &bench.clock, &bench.link("servos1"));
     bench.plug = Some(plug);
     bench.chain.reopen().expect("it is back under another name");
     assert!(bench.chain.client().port_name().ends_with("servos1"));
+    // Their watchdogs have stopped them where they were.
+    let goals: Vec<u32> = (1..=3).map(|id| bench.goal(id)).collect();
+    assert!(
+        goals.iter().all(|goal| goal.abs_diff(2244) < 10),
+        "{goals:?}"
+    );
     for _ in 0..20 {
         assert_eq!(bench.cycle(-0.5).expect("it is read"), 3);
     }
@@ -191,9 +198,8 @@ fn another_chain_is_not_taken_for_ours() {
     }
     drop(taken);
     drop(plugs);
-    // One of another model under our ids.
+    // Only the right one is.
     let plug = Plug::in_at(&bench.line, &bench.clock, &bench.link("servos0"));
     bench.chain.reopen().expect("it is back under its own name");
     drop(plug);
-    let _ = Servo::factory(&XL430_W250);
 }

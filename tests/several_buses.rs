@@ -34,25 +34,29 @@ impl Rig {
             let line = Line::commissioned(&XL430_W250, 1..=6, 1_000_000, line_options);
             SharedLine::new(line.expect("a known rate"))
         });
-        let parts = ["odd", "even"].iter().zip(&lines).enumerate().map(|(offset, (name, line))| {
-            let branch = clock.branch();
-            let own: Arc<dyn Clock> = match &branch {
-                Some(branch) => Arc::new(branch.clone()),
-                None => Arc::clone(&clock),
-            };
-            let port = SimPort::new(line.clone(), own, 1_000_000);
-            let master = Master::new(Box::new(port), MasterOptions::default());
-            let specs = (1..=6u8).map(|id| {
-                ServoSpec::new(id, format!("joint{}", 2 * id - 1 + offset as u8), model)
+        let parts = ["odd", "even"]
+            .iter()
+            .zip(&lines)
+            .enumerate()
+            .map(|(offset, (name, line))| {
+                let branch = clock.branch();
+                let own: Arc<dyn Clock> = match &branch {
+                    Some(branch) => Arc::new(branch.clone()),
+                    None => Arc::clone(&clock),
+                };
+                let port = SimPort::new(line.clone(), own, 1_000_000);
+                let master = Master::new(Box::new(port), MasterOptions::default());
+                let specs = (1..=6u8).map(|id| {
+                    ServoSpec::new(id, format!("joint{}", 2 * id - 1 + offset as u8), model)
+                });
+                let chain =
+                    DynamixelChain::new(Box::new(master), specs.collect(), ChainOptions::default());
+                BusPart {
+                    name: (*name).to_owned(),
+                    bus: Box::new(chain.expect("sensible specs")),
+                    branch,
+                }
             });
-            let chain =
-                DynamixelChain::new(Box::new(master), specs.collect(), ChainOptions::default());
-            BusPart {
-                name: (*name).to_owned(),
-                bus: Box::new(chain.expect("sensible specs")),
-                branch,
-            }
-        });
         let joints = (1..=12).map(|joint| format!("joint{joint}")).collect();
         let bus = ParallelBus::new(joints, parts.collect(), Arc::clone(&clock), || {});
         let mut rig = Rig {
@@ -78,13 +82,18 @@ impl Rig {
     }
 
     fn run(&mut self, cycles: usize, targets: &[f64]) -> CycleReport {
-        let last = (0..cycles).map(|_| self.cycle(targets).expect("healthy chains")).last();
+        let last = (0..cycles)
+            .map(|_| self.cycle(targets).expect("healthy chains"))
+            .last();
         last.expect("at least one cycle")
     }
 
     fn fault(&self, line: usize, spec: &str) {
         let fault = spec.parse().expect("a good specification");
-        self.lines[line].lock().inject(fault).expect("a servo of the line");
+        self.lines[line]
+            .lock()
+            .inject(fault)
+            .expect("a servo of the line");
     }
 
     fn position_rad(&self, joint: usize) -> f64 {
@@ -107,8 +116,14 @@ fn targets_and_states_find_their_joints_in_the_time_of_one_bus() {
     assert_eq!(report.cycle_us, 1560, "{report:?}");
     for (joint, target) in wave().iter().enumerate() {
         let (is, told) = (rig.position_rad(joint), rig.states[joint].position);
-        assert!((is - target).abs() < 0.01, "joint {joint} stands at {is}, target {target}");
-        assert!((is - told).abs() < 0.01, "joint {joint} stands at {is}, told is {told}");
+        assert!(
+            (is - target).abs() < 0.01,
+            "joint {joint} stands at {is}, target {target}"
+        );
+        assert!(
+            (is - told).abs() < 0.01,
+            "joint {joint} stands at {is}, told is {told}"
+        );
     }
     let mut goals = [0.0; 12];
     rig.bus.goals(&mut goals);
@@ -116,8 +131,20 @@ fn targets_and_states_find_their_joints_in_the_time_of_one_bus() {
         assert!((goal - target).abs() < 0.001, "{goals:?}");
     }
     assert_eq!(rig.bus.health().len(), 12);
-    assert!(rig.bus.health().iter().all(|h| h.temperature_c == Some(32.0)));
-    assert_eq!(rig.bus.torque_off().expect("both are there").confirmed_off.len(), 12);
+    assert!(
+        rig.bus
+            .health()
+            .iter()
+            .all(|h| h.temperature_c == Some(32.0))
+    );
+    assert_eq!(
+        rig.bus
+            .torque_off()
+            .expect("both are there")
+            .confirmed_off
+            .len(),
+        12
+    );
 }
 
 #[test]
@@ -126,7 +153,11 @@ fn a_silent_servo_is_told_by_its_place_in_the_whole() {
     rig.run(100, &wave());
     rig.fault(1, &format!("3:silent@{}s", rig.clock.now().secs()));
     let report = rig.run(20, &wave());
-    assert_eq!((report.fresh, report.silent_mask), (11, 1 << 5), "joint6: {report:?}");
+    assert_eq!(
+        (report.fresh, report.silent_mask),
+        (11, 1 << 5),
+        "joint6: {report:?}"
+    );
     rig.bus.reboot(2).expect("joint3 is servo 2 of the first");
     let report = rig.run(200, &wave());
     assert_eq!(report.torqueless_mask, 1 << 2, "{report:?}");
@@ -146,11 +177,18 @@ fn a_lost_bus_is_named_and_the_joints_of_the_other_stay_driven() {
     assert!(matches!(error, BusError::OnBus { .. }), "{text}");
     for _ in 0..150 {
         let report = rig.cycle(&wave()).expect("the second bus is there");
-        assert_eq!((report.fresh, report.silent_mask), (6, 0b0101_0101_0101), "{report:?}");
+        assert_eq!(
+            (report.fresh, report.silent_mask),
+            (6, 0b0101_0101_0101),
+            "{report:?}"
+        );
     }
     let (lost, driven) = (rig.position_rad(10), rig.position_rad(11));
     assert!(lost.abs() < 0.01, "joint11 of the lost bus went to {lost}");
-    assert!((driven - 0.22).abs() < 0.01, "joint12 stands at {driven}, target 0.22");
+    assert!(
+        (driven - 0.22).abs() < 0.01,
+        "joint12 stands at {driven}, target 0.22"
+    );
     // It is not there yet: the search says so, and the others go on.
     let still = rig.bus.reopen().expect_err("unplugged");
     assert!(still.to_string().contains("bus odd"), "{still}");
@@ -167,12 +205,18 @@ fn a_lost_bus_is_named_and_the_joints_of_the_other_stay_driven() {
         assert!(searches < 600, "it is not found again");
     }
     let goal = rig.lines[0].lock().servo(6).expect("a servo").register(116);
-    assert!(goal.abs_diff(2048) < 4, "joint11 was sent to {goal} before it was armed");
+    assert!(
+        goal.abs_diff(2048) < 4,
+        "joint11 was sent to {goal} before it was armed"
+    );
     rig.bus.prepare(&mut rig.states).expect("it is back");
     rig.bus.arm().expect("it is back");
     assert_eq!(rig.run(200, &wave()).fresh, 12);
     let back = rig.position_rad(10);
-    assert!((back - 0.2).abs() < 0.01, "joint11 stands at {back}, target 0.2");
+    assert!(
+        (back - 0.2).abs() < 0.01,
+        "joint11 stands at {back}, target 0.2"
+    );
 }
 
 #[test]
@@ -184,7 +228,10 @@ fn when_all_are_lost_every_exchange_fails() {
     }
     let first = rig.cycle(&wave()).expect_err("both are gone").to_string();
     let second = rig.cycle(&wave()).expect_err("both are gone").to_string();
-    assert!(first.contains("bus odd") && second.contains("bus even"), "{first}; {second}");
+    assert!(
+        first.contains("bus odd") && second.contains("bus even"),
+        "{first}; {second}"
+    );
     rig.cycle(&wave()).expect_err("both are gone");
     rig.bus.torque_off().expect_err("nobody is reached");
 }
@@ -205,7 +252,11 @@ fn threads_do_what_virtual_time_does() {
     let report = rig.cycle(&wave()).expect("the second bus is there");
     assert_eq!(report.fresh, 6, "{report:?}");
     let torque = rig.bus.torque_off().expect("one is there");
-    assert_eq!((torque.confirmed_off.len(), torque.unconfirmed.len()), (6, 6), "{torque:?}");
+    assert_eq!(
+        (torque.confirmed_off.len(), torque.unconfirmed.len()),
+        (6, 6),
+        "{torque:?}"
+    );
 }
 
 /// The built-in quadruped with its left and right legs on buses of their own, ids 1 to 6 on both.
@@ -272,19 +323,56 @@ fn buses_are_named_on_the_command_line_and_errors_say_what_is_wrong() {
     let fails = |args: &[&str], parts: &[&str]| {
         let ended = run_virtual(&[&[config.as_str()][..], args].concat()).expect(2);
         for part in parts {
-            assert!(ended.err.contains(part), "{args:?}: {part} is not in: {}", ended.err);
+            assert!(
+                ended.err.contains(part),
+                "{args:?}: {part} is not in: {}",
+                ended.err
+            );
         }
     };
-    fails(&["--bus", "tail=sim"], &["no bus called 'tail'. Buses: right, left"]);
-    fails(&["--bus", "left=dynamixel:/dev/null"], &["--speed max would drive the servos"]);
-    folder.edit("quadruped.toml", "front_left_hip\",    bus = \"left\"", "front_left_hip\",    bus = \"lft\"");
-    fails(&[], &["quadruped.toml:", "there is no bus called \"lft\"", "did you mean", "Buses: right, left"]);
-    folder.edit("quadruped.toml", "front_left_hip\",    bus = \"lft\",", "front_left_hip\",    ");
-    fails(&[], &["say which bus joint front_left_hip hangs on: bus = one of right, left"]);
-    folder.edit("quadruped.toml", "front_left_hip\",    servo", "front_left_hip\",    bus = \"right\", servo");
+    fails(
+        &["--bus", "tail=sim"],
+        &["no bus called 'tail'. Buses: right, left"],
+    );
+    fails(
+        &["--bus", "left=dynamixel:/dev/null"],
+        &["--speed max would drive the servos"],
+    );
+    folder.edit(
+        "quadruped.toml",
+        "front_left_hip\",    bus = \"left\"",
+        "front_left_hip\",    bus = \"lft\"",
+    );
+    fails(
+        &[],
+        &[
+            "quadruped.toml:",
+            "there is no bus called \"lft\"",
+            "did you mean",
+            "Buses: right, left",
+        ],
+    );
+    folder.edit(
+        "quadruped.toml",
+        "front_left_hip\",    bus = \"lft\",",
+        "front_left_hip\",    ",
+    );
+    fails(
+        &[],
+        &["say which bus joint front_left_hip hangs on: bus = one of right, left"],
+    );
+    folder.edit(
+        "quadruped.toml",
+        "front_left_hip\",    servo",
+        "front_left_hip\",    bus = \"right\", servo",
+    );
     fails(&[], &["servo 1 is already given to joint"]);
     folder.edit("quadruped.toml", "name = \"left\"\n", "name = \"right\"\n");
     fails(&[], &["two buses are called \"right\""]);
-    folder.edit("quadruped.toml", "name = \"right\"\nbus = \"sim\"\n\n", "bus = \"sim\"\nname = \"left\"\nrate_hz = 100\n\n");
+    folder.edit(
+        "quadruped.toml",
+        "name = \"right\"\nbus = \"sim\"\n\n",
+        "bus = \"sim\"\nname = \"left\"\nrate_hz = 100\n\n",
+    );
     fails(&[], &["bus.rate_hz", "all buses go in one control cycle"]);
 }

@@ -5,7 +5,7 @@ use super::master::{Accepted, FAST_BYTES, Master};
 use handwave_dynamixel::fast::{self, Blocks};
 use handwave_dynamixel::instruction::{BulkReadEntry, Instruction, SyncRead};
 use handwave_dynamixel::lists::encode_bulk_read;
-use handwave_dynamixel::{BROADCAST_ID, BufferTooSmall, ErrorCode, wire};
+use handwave_dynamixel::{BROADCAST_ID, BufferTooSmall, ErrorCode, Status, wire};
 use std::time::Duration;
 
 /// Waking up this much later than asked for, the system had no time for us.
@@ -107,6 +107,7 @@ impl Master {
         let count = asked.count();
         // The servo whose turn it is.
         let mut turn = 0;
+        let mut silence = false;
         while turn < count {
             // Some servos pass over a silent predecessor when its time is over: the wait lasts until
             // the second one behind it had its turn, or its answer would collide with the next request.
@@ -115,10 +116,9 @@ impl Master {
             let behind = count - turn - 1;
             let again = asked.request(behind) + behind * wire::status(0) + asked.rest(turn + 1);
             let deadline = self.deadline(due, again);
-            let want = asked.statuses(count) - asked.statuses(turn);
             let mut heard = turn;
             let bad_crc = self.parser.damage().bad_crc;
-            let answered = self.receive(want, deadline, |status| {
+            let mut accept = |status: &Status<'_>| {
                 let index = asked.position(status.id);
                 let Some(index) = index.filter(|&index| outcomes[index] == Outcome::NotReached)
                 else {
@@ -140,7 +140,15 @@ impl Master {
                     Outcome::Damaged
                 };
                 Accepted::Done
-            })?;
+            };
+            // All of the rest at once, until it should be there. Only then, with time to spare, what may be
+            // late: one that stays silent must not keep the answers behind it waiting.
+            let rest = asked.statuses(count) - asked.statuses(turn);
+            let whole = self.due(count as u32, asked.statuses(count)) + self.allowance.get();
+            let mut answered = self.receive(rest, deadline.min(whole), &mut accept)?;
+            if !answered && whole < deadline {
+                answered = self.receive(1, deadline, &mut accept)?;
+            }
             let missing = if self.parser.damage().bad_crc > bad_crc {
                 Outcome::Damaged
             } else {
@@ -156,8 +164,10 @@ impl Master {
                     *passed = missing;
                 }
             }
+            silence |= heard > turn;
             turn = turn.max(heard + 1);
-            if turn == count {
+            // After a silence, how late the last one is says nothing of the adapter.
+            if turn == count && !silence {
                 self.arrived(self.due(turn as u32, asked.statuses(turn)));
             }
         }

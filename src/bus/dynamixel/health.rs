@@ -23,8 +23,8 @@ const MARGIN: Duration = Duration::from_micros(100);
 /// Longest span of registers that is read in one go.
 const SPAN_BYTES: usize = 8;
 
-/// One count of supply voltage, volts.
-const VOLT: f64 = 0.1;
+/// Counts of supply voltage in a volt.
+const COUNTS_PER_VOLT: f64 = 10.0;
 
 /// Where a model keeps what is watched.
 #[derive(Copy, Clone, Debug, Default)]
@@ -198,7 +198,7 @@ impl DynamixelChain {
         match turn {
             Turn::Vitals => {
                 let volts = vitals.value(vitals.voltage, bytes);
-                value.voltage_v = volts.map(|count| count * VOLT);
+                value.voltage_v = volts.map(|count| count / COUNTS_PER_VOLT);
                 value.temperature_c = vitals.value(vitals.temperature, bytes);
             }
             Turn::Error => {
