@@ -354,8 +354,8 @@ fn buses_are_named_on_the_command_line_and_errors_say_what_is_wrong() {
     );
     folder.edit(
         "quadruped.toml",
-        "front_left_hip\",    bus = \"lft\",",
-        "front_left_hip\",    ",
+        "front_left_hip\",    bus = \"lft\", servo",
+        "front_left_hip\",    servo",
     );
     fails(
         &[],

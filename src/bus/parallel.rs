@@ -106,7 +106,9 @@ impl ParallelBus {
         let begin = self.clock.now();
         let last = self.lanes.iter().rposition(&wanted);
         for (index, lane) in self.lanes.iter_mut().enumerate() {
-            if Some(index) != last && wanted(lane) {
+            // Decided now: a part that is away is not wanted by the looks of it.
+            lane.takes_part = wanted(lane);
+            if Some(index) != last && lane.takes_part {
                 lane.start(job, begin);
             }
         }
@@ -114,7 +116,7 @@ impl ParallelBus {
             lane.run_here(job, begin);
         }
         let mut end = begin;
-        for lane in self.lanes.iter_mut().filter(|lane| wanted(lane)) {
+        for lane in self.lanes.iter_mut().filter(|lane| lane.takes_part) {
             lane.wait();
             end = end.max(lane.time().unwrap_or(begin));
         }
@@ -180,9 +182,10 @@ impl ServoBus for ParallelBus {
     fn prepare(&mut self, states: &mut [JointState]) -> Result<(), BusError> {
         self.all(Job::Prepare, |lane| lane.is_free() && !lane.prepared);
         for lane in &mut self.lanes {
-            if let Some(Done::Prepared(outcome)) = lane.take_done() {
+            if lane.takes_part
+                && let Some(Done::Prepared(outcome)) = lane.take_done()
+            {
                 lane.prepared = outcome.is_ok();
-                lane.lost &= outcome.is_err();
                 lane.error = outcome.err();
             }
             lane.copy_states(states);
@@ -196,7 +199,9 @@ impl ServoBus for ParallelBus {
         self.all(Job::Arm, wanted);
         let mut failed = false;
         for lane in &mut self.lanes {
-            if let Some(Done::Armed(outcome)) = lane.take_done() {
+            if lane.takes_part
+                && let Some(Done::Armed(outcome)) = lane.take_done()
+            {
                 lane.armed = outcome.is_ok();
                 lane.newly_armed = lane.armed;
                 failed |= outcome.is_err();
@@ -235,6 +240,11 @@ impl ServoBus for ParallelBus {
         let mut whole = CycleReport::default();
         let mut alive = false;
         for lane in &mut self.lanes {
+            // What came of the search for a lost one is not taken here.
+            if !lane.takes_part {
+                lane.add_silence(&mut whole);
+                continue;
+            }
             match lane.take_done() {
                 Some(Done::Exchanged(Ok(report))) => {
                     alive = true;

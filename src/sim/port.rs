@@ -14,8 +14,8 @@ pub struct SimPort {
     line: SharedLine,
     clock: Arc<dyn Clock>,
     baud: u32,
-    /// Lost, and not opened again since.
-    gone: bool,
+    /// Let go of, and not opened again since.
+    closed: bool,
 }
 
 impl SimPort {
@@ -25,19 +25,17 @@ impl SimPort {
             line,
             clock,
             baud: baud_bps,
-            gone: false,
+            closed: false,
         }
     }
 
-    fn check(&mut self, now: Time) -> Result<(), PortError> {
+    fn check(&self, now: Time) -> Result<(), PortError> {
         let mut line = self.line.lock();
-        if !self.gone && !line.is_unplugged(now) {
+        if !self.closed && !line.is_unplugged(now) {
             return Ok(());
         }
         line.advance(now);
         line.clear();
-        self.gone = true;
-        drop(line);
         Err(PortError::Gone {
             port: self.name().to_owned(),
             reason: "unplugged by an injected fault".to_owned(),
@@ -114,11 +112,11 @@ impl Port for SimPort {
 
     /// It comes back under its own name, once it is plugged in again.
     fn reopen(&mut self, _: &str) -> Result<(), PortError> {
-        self.gone = false;
+        self.closed = false;
         self.check(self.clock.now())
     }
 
     fn close(&mut self) {
-        self.gone = true;
+        self.closed = true;
     }
 }

@@ -130,6 +130,8 @@ pub(super) struct Lane {
     pub prepared: bool,
     pub armed: bool,
     pub newly_armed: bool,
+    /// It was given the last job of all.
+    pub takes_part: bool,
     /// Its bus failed and is left out.
     pub lost: bool,
     /// Its error, not told yet.
@@ -168,6 +170,7 @@ impl Lane {
             prepared: false,
             armed: false,
             newly_armed: false,
+            takes_part: false,
             lost: false,
             error: None,
         })
