@@ -205,21 +205,21 @@ impl Master {
         self.damaged += begin as u64;
         let mut blocks = Blocks::new(&bytes[begin..]);
         let mut damaged = false;
-        for index in 0..asked.count() {
+        for (index, outcome) in outcomes.iter_mut().enumerate().take(asked.count()) {
             let (begin, size) = (asked.offset(index), asked.size(index));
             match blocks.next_block(asked.id(index), size) {
                 Ok(block) if block.error == ErrorCode::None => {
                     if let Some(place) = data.get_mut(begin..begin + size) {
                         place.copy_from_slice(block.data);
-                        outcomes[index] = Outcome::Fresh(Reply { alert: block.alert });
+                        *outcome = Outcome::Fresh(Reply { alert: block.alert });
                     }
                 }
-                Ok(block) => outcomes[index] = Outcome::Refused(block.error),
+                Ok(block) => *outcome = Outcome::Refused(block.error),
                 Err(fast::BlockError::Incomplete { missing }) => {
                     // Bytes of its own, or bytes lost before it: somebody spoke here.
                     let spoke = missing < size + fast::BLOCK_OVERHEAD;
                     self.damaged += u64::from(spoke);
-                    outcomes[index] = if spoke || damaged {
+                    *outcome = if spoke || damaged {
                         Outcome::Damaged
                     } else {
                         Outcome::Silent
@@ -229,7 +229,7 @@ impl Master {
                 Err(_) => {
                     damaged = true;
                     self.damaged += 1;
-                    outcomes[index] = Outcome::Damaged;
+                    *outcome = Outcome::Damaged;
                     blocks.skip_block(size);
                 }
             }
