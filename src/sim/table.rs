@@ -299,7 +299,7 @@ impl ControlTable {
         while at < data.len() {
             let target = self.resolve(addr + at as u16);
             let register = self.register_at(target).ok_or(TableError::Access)?;
-            let locked = torque_on && register.is_eeprom();
+            let locked = torque_on && self.device.model.is_eeprom(register);
             if register.access == Access::Read || locked {
                 return Err(TableError::Access);
             }
