@@ -109,6 +109,7 @@ fn servo_spec(
         direction,
         min_pulse,
         max_pulse,
+        ..ServoSpec::new(0, "", model)
     };
     spec.check()
         .map_err(|e| at.at(entry.name.span(), "robot.joint", e))?;

@@ -12,13 +12,18 @@ pub mod chain;
 mod check;
 pub mod client;
 mod cycle;
+mod facts;
+mod follow;
+mod goals;
 mod group_read;
+mod groups;
 pub mod master;
 pub mod model;
 mod recovery;
 #[cfg(test)]
 mod scripted;
 pub mod servo;
+pub mod settings;
 #[cfg(test)]
 mod tests;
 
@@ -27,8 +32,9 @@ pub use backend_dynamixel2::Dynamixel2Client;
 pub use chain::{ChainOptions, DynamixelChain};
 pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
 pub use master::{Master, MasterOptions};
-pub use model::{Model, Protocol, Register};
+pub use model::{Mode, Model, Protocol, Register};
 pub use servo::{Direction, ServoSpec, SpecError};
+pub use settings::{Follow, Gains, Profile, Settings};
 
 use super::address::DynamixelBackend;
 use super::port::{PortError, WrapPort};

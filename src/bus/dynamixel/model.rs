@@ -321,22 +321,39 @@ mod tests {
     fn every_layout_holds_the_registers_that_the_driver_works_with() {
         for x_series in XL430_W250.registers {
             // LEDs and the backup flag are where the model puts them; MX servos have no start-up configuration.
-            if ["led", "backup_ready", "startup_configuration", "present_load"].contains(&x_series.name) {
+            if [
+                "led",
+                "backup_ready",
+                "startup_configuration",
+                "present_load",
+            ]
+            .contains(&x_series.name)
+            {
                 continue;
             }
-            for model in MODELS.iter().filter(|model| model.protocol == Protocol::Two) {
-                let found = model.register(x_series.name).unwrap_or_else(|| {
-                    panic!("{} has no {}", model.name, x_series.name)
-                });
+            for model in MODELS
+                .iter()
+                .filter(|model| model.protocol == Protocol::Two)
+            {
+                let found = model
+                    .register(x_series.name)
+                    .unwrap_or_else(|| panic!("{} has no {}", model.name, x_series.name));
                 let expected = match x_series.name {
                     "indirect_address_1" => x_series.address,
                     _ => model.layout.at(x_series.address),
                 };
                 assert_eq!(found.address, expected, "{} of {}", found.name, model.name);
-                assert_eq!(found.size, x_series.size, "{} of {}", found.name, model.name);
+                assert_eq!(
+                    found.size, x_series.size,
+                    "{} of {}",
+                    found.name, model.name
+                );
             }
         }
-        for model in MODELS.iter().filter(|model| model.protocol == Protocol::Two) {
+        for model in MODELS
+            .iter()
+            .filter(|model| model.protocol == Protocol::Two)
+        {
             let effort = model.register_at(model.layout.at(address::PRESENT_STATE));
             let expected = match model.effort {
                 Effort::Load => "present_load",
@@ -350,7 +367,10 @@ mod tests {
     fn the_indirect_data_of_the_330_size_moved_with_firmware_52() {
         let data = |name: &str, firmware| -> Vec<(u16, u16)> {
             let model = Model::by_name(name).expect("a known model");
-            model.indirect(firmware).map(|b| (b.data, b.slots)).collect()
+            model
+                .indirect(firmware)
+                .map(|b| (b.data, b.slots))
+                .collect()
         };
         assert_eq!(data("xl330-m288", 51), [(224, 20)]);
         assert_eq!(data("xl330-m288", 52), [(208, 20)]);

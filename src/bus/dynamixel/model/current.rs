@@ -1,6 +1,6 @@
 //! Control tables of X430, X540 and MX servos: the XL430's with other ranges, and with current in place of load.
 
-use super::table::{I16, rw, r, table};
+use super::table::{I16, r, rw, table};
 use super::x430::{REGISTERS, VOLT};
 
 const MA_2_69: &str = "2.69 mA";

@@ -9,17 +9,61 @@ const NUMBERS: &str = include_str!("tables/dynamixel.model");
 const FILES: [(&str, &str, &str); 13] = [
     ("mx_28.model", "mx-28-2", include_str!("tables/mx_28.model")),
     ("mx_64.model", "mx-64-2", include_str!("tables/mx_64.model")),
-    ("mx_106.model", "mx-106-2", include_str!("tables/mx_106.model")),
-    ("ph42_020_s300.model", "ph42-020-s300", include_str!("tables/ph42_020_s300.model")),
-    ("xc330_m288.model", "xc330-m288", include_str!("tables/xc330_m288.model")),
-    ("xc330_t288.model", "xc330-t288", include_str!("tables/xc330_t288.model")),
-    ("xh430_w350.model", "xh430-w350", include_str!("tables/xh430_w350.model")),
-    ("xl330_m077.model", "xl330-m077", include_str!("tables/xl330_m077.model")),
-    ("xl330_m288.model", "xl330-m288", include_str!("tables/xl330_m288.model")),
-    ("xl430_w250.model", "xl430-w250", include_str!("tables/xl430_w250.model")),
-    ("xm430_w210.model", "xm430-w210", include_str!("tables/xm430_w210.model")),
-    ("xm430_w350.model", "xm430-w350", include_str!("tables/xm430_w350.model")),
-    ("xm540_w270.model", "xm540-w270", include_str!("tables/xm540_w270.model")),
+    (
+        "mx_106.model",
+        "mx-106-2",
+        include_str!("tables/mx_106.model"),
+    ),
+    (
+        "ph42_020_s300.model",
+        "ph42-020-s300",
+        include_str!("tables/ph42_020_s300.model"),
+    ),
+    (
+        "xc330_m288.model",
+        "xc330-m288",
+        include_str!("tables/xc330_m288.model"),
+    ),
+    (
+        "xc330_t288.model",
+        "xc330-t288",
+        include_str!("tables/xc330_t288.model"),
+    ),
+    (
+        "xh430_w350.model",
+        "xh430-w350",
+        include_str!("tables/xh430_w350.model"),
+    ),
+    (
+        "xl330_m077.model",
+        "xl330-m077",
+        include_str!("tables/xl330_m077.model"),
+    ),
+    (
+        "xl330_m288.model",
+        "xl330-m288",
+        include_str!("tables/xl330_m288.model"),
+    ),
+    (
+        "xl430_w250.model",
+        "xl430-w250",
+        include_str!("tables/xl430_w250.model"),
+    ),
+    (
+        "xm430_w210.model",
+        "xm430-w210",
+        include_str!("tables/xm430_w210.model"),
+    ),
+    (
+        "xm430_w350.model",
+        "xm430-w350",
+        include_str!("tables/xm430_w350.model"),
+    ),
+    (
+        "xm540_w270.model",
+        "xm540-w270",
+        include_str!("tables/xm540_w270.model"),
+    ),
 ];
 
 /// The rows of a section, split at tabs, without its heading.
@@ -55,8 +99,10 @@ fn every_row_of_the_vendors_files_is_in_our_tables() {
             let [address, size, vendor] = row[..] else {
                 panic!("{file}: {row:?}")
             };
-            let (address, size): (u16, u8) =
-                (address.parse().expect("a number"), size.parse().expect("a number"));
+            let (address, size): (u16, u8) = (
+                address.parse().expect("a number"),
+                size.parse().expect("a number"),
+            );
             let ours = our_name(vendor);
             if ours.starts_with("indirect") {
                 // Names of the vendor's own use of the slots; firmware before 52.
@@ -70,7 +116,11 @@ fn every_row_of_the_vendors_files_is_in_our_tables() {
             }
             let register = model.register(&ours);
             let register = register.unwrap_or_else(|| panic!("{file}: {ours} is missing"));
-            assert_eq!((register.address, register.size), (address, size), "{file}: {ours}");
+            assert_eq!(
+                (register.address, register.size),
+                (address, size),
+                "{file}: {ours}"
+            );
         }
     }
 }
