@@ -13,6 +13,7 @@ use super::numbers::check_numbers;
 use super::parts::{Parts, parts};
 use super::safety::Safety;
 use super::search::{SearchParts, search_parts};
+use super::servos::check_stopping;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{
@@ -190,6 +191,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         None => EstimatorKind::default(),
     };
     let safety = &file.safety;
+    check_stopping(&servos, safety.on_exit, wire.watchdog_ms, &at)?;
     let front_options = FrontEndOptions {
         estimator,
         lambda: file.input.window,

@@ -146,6 +146,11 @@ impl Settings {
             Mode::Current => MAX_CURRENT_GAIN,
             _ => return Ok(()),
         };
+        if mode == Mode::Velocity && d != 0.0 {
+            return Err(format!(
+                "host_gains d = {d}; mode \"velocity\" has p alone, the servo itself damps"
+            ));
+        }
         if !(p > 0.0 && p <= most && (0.0..=most).contains(&d)) {
             return Err(format!(
                 "host_gains p = {p}, d = {d}; p takes more than 0 and at most {most}, d 0 to {most}"
