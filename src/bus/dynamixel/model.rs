@@ -230,7 +230,7 @@ impl Model {
     pub fn goal_range(&self, mode: Mode) -> (i32, i32) {
         let turn = self.pulses_per_turn as i32;
         if mode.has_position_limits() {
-            match self.register_at(address::MAX_POSITION_LIMIT) {
+            match self.register("max_position_limit") {
                 Some(limit) => (limit.min as i32, limit.max as i32),
                 None => (0, turn - 1),
             }

@@ -46,7 +46,7 @@ const MOVED_BLOCK: &[IndirectBlock] = &[
 const NEVER: u8 = u8::MAX;
 
 /// What X series servos that report load have in common.
-const X_LOAD: Model = Model {
+pub(super) const X_LOAD: Model = Model {
     protocol: Protocol::Two,
     name: "",
     number: 0,

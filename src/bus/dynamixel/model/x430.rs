@@ -3,7 +3,8 @@
 //! The one place where these facts stand; the driver, the commands and the simulated servos look them up.
 
 use super::Register;
-use super::table::{I16, I32, U8, U16, U32, r, rw};
+use super::table::{I16, I32, U8, U16, U32};
+pub(super) use super::table::{r, rw};
 
 pub(super) const PULSE: &str = "0.088 deg";
 pub(super) const VELOCITY: &str = "0.229 rev/min";
