@@ -12,8 +12,12 @@ use handwave_dynamixel::wire;
 pub use servos::{Bench, BenchServo, Found, InspectError};
 use std::time::Duration;
 
-/// How often a servo that stays silent is asked again; in between the cycle goes on without it.
+/// A servo that was silent in so many cycles in a row is left out.
+const SILENT_CYCLES: u32 = 3;
+/// How often one that is left out is asked again.
 const RETRY_EVERY: Duration = Duration::from_millis(250);
+/// Without a period: an answer that comes later than this counts as lost. Until then the cycle is a long one.
+const LATEST: Duration = Duration::from_millis(20);
 
 /// Which instruction reads the states.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -174,8 +178,22 @@ struct Cycle {
     outcomes: Vec<Outcome>,
     driven: Vec<u8>,
     goals: Vec<u8>,
-    /// When a silent servo is asked again; `None` for one that answers.
-    retry_at: Vec<Option<Time>>,
+    silence: Vec<Silence>,
+}
+
+/// How long a servo has been silent.
+#[derive(Copy, Clone, Debug, Default)]
+struct Silence {
+    /// Cycles in a row in which it was asked in vain.
+    cycles: u32,
+    /// When it was asked last.
+    asked_at: Time,
+}
+
+impl Silence {
+    fn leaves_out(&self, now: Time) -> bool {
+        self.cycles >= SILENT_CYCLES && now.saturating_since(self.asked_at) < RETRY_EVERY
+    }
 }
 
 impl Cycle {
@@ -188,7 +206,7 @@ impl Cycle {
             outcomes: vec![Outcome::NotReached; count],
             driven: Vec::with_capacity(count),
             goals: Vec::with_capacity(count * bench.layout.goal_len),
-            retry_at: vec![None; count],
+            silence: vec![Silence::default(); count],
         }
     }
 }
@@ -207,6 +225,14 @@ impl Bench {
         stop: &dyn Fn() -> bool,
     ) -> Result<BenchReport, ClientError> {
         client.set_return_delay(self.return_delay);
+        let driven = self.servos.iter().filter(|s| s.goal.is_some()).count();
+        let limit = wire_time(
+            options.reads,
+            client.baud(),
+            (driven, self.layout.goal_len),
+            (self.servos.len(), self.layout.state_len),
+            self.return_delay,
+        );
         let mut cycle = Cycle::new(self);
         let mut counts: Vec<ServoCount> = self.servos.iter().map(ServoCount::of).collect();
         let mut times = Microseconds::default();
@@ -230,14 +256,20 @@ impl Bench {
                 due = due + period;
             }
             let started = client.now();
+            let end = started + options.period.unwrap_or(limit + LATEST);
+            client.set_cycle_end(Some(end));
             self.cycle(client, options.reads, &mut cycle, &mut counts)?;
             let took = client.now().saturating_since(started);
             times.add(u64::try_from(took.as_micros()).unwrap_or(u64::MAX));
             cycles += 1;
+            if cycle.asked.is_empty() {
+                // Nobody is left to wait for.
+                wait(RETRY_EVERY / 10);
+            }
         }
         let span = client.now().saturating_since(begin);
         let cpu = cpu_time().saturating_sub(cpu);
-        let driven = self.servos.iter().filter(|s| s.goal.is_some()).count();
+        client.set_cycle_end(None);
         Ok(BenchReport {
             reads: options.reads,
             cycles,
@@ -246,13 +278,7 @@ impl Bench {
             cpu_us: cpu.as_secs_f64() * 1e6 / (cycles.max(1) as f64),
             late,
             noise: client.traffic().damaged.saturating_sub(noise),
-            wire: wire_time(
-                options.reads,
-                client.baud(),
-                (driven, self.layout.goal_len),
-                (self.servos.len(), self.layout.state_len),
-                self.return_delay,
-            ),
+            wire: limit,
             servos: counts,
             interrupted,
         })
@@ -275,12 +301,11 @@ impl Bench {
                 cycle.driven.push(servo.id);
                 cycle.goals.extend_from_slice(&goal[..layout.goal_len]);
             }
-            match cycle.retry_at[place] {
-                Some(at) if now < at => counts[place].left_out += 1,
-                _ => {
-                    cycle.asked.push(servo.id);
-                    cycle.places.push(place);
-                }
+            if cycle.silence[place].leaves_out(now) {
+                counts[place].left_out += 1;
+            } else {
+                cycle.asked.push(servo.id);
+                cycle.places.push(place);
             }
         }
         if !cycle.driven.is_empty() {
@@ -302,9 +327,13 @@ impl Bench {
         let answers = data.chunks_exact(layout.state_len).zip(&*outcomes);
         for ((bytes, &outcome), &place) in answers.zip(&cycle.places) {
             counts[place].errors.count(outcome);
-            cycle.retry_at[place] = match outcome {
-                Outcome::Silent => Some(client.now() + RETRY_EVERY),
-                _ => None,
+            let silence = &mut cycle.silence[place];
+            silence.asked_at = now;
+            silence.cycles = match outcome {
+                Outcome::Silent => silence.cycles + 1,
+                // Its turn did not come: nothing is known.
+                Outcome::NotReached => silence.cycles,
+                _ => 0,
             };
             if let Outcome::Fresh(reply) = outcome {
                 counts[place].fresh += 1;

@@ -5,7 +5,9 @@ use crate::base::Clock;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::{Client, ClientError};
 use crate::cli::{ExitStatus, Failure};
-use crate::live::bus_bench::{Bench, BenchOptions, BenchReport, Found, InspectError, Reads};
+use crate::live::bus_bench::{
+    Bench, BenchOptions, BenchReport, Found, InspectError, Reads, ServoCount,
+};
 use crate::live::clock::thread_cpu_time;
 use crate::live::stop::StopRequest;
 use crate::live::{RealClock, StopSwitch, realtime};
@@ -20,7 +22,8 @@ use std::time::Duration;
 Finds the servos by a scan, then does one cycle after the other: a sync write of all goals, a read of all states
 (current or load, velocity, position). The goal of a servo without torque is its present position. One with torque
 gets the goal that it has, or its present position if that goal is far away. A servo that turns torque on by a goal
-(drive_mode bit 3) gets none. A servo that falls silent is left out and asked again every 250 ms.
+(drive_mode bit 3) gets none. A servo that is silent three cycles in a row is left out and asked again every 250 ms.
+An answer counts as lost when it comes 20 ms late, with --rate at the end of the cycle.
 
 Prints cycles per second beside what the wire allows (byte times and return delays), the time of a cycle (median, 99th
 percentile, longest), processor time per cycle, and errors by kind: silent (no answer), damaged, refused (answered with
@@ -230,9 +233,7 @@ fn table(
             report.noise
         ),
     )?;
-    let troubled = |servo: &&crate::live::bus_bench::ServoCount| {
-        servo.errors.total() + servo.alerts + servo.left_out > 0
-    };
+    let troubled = |servo: &&ServoCount| servo.errors.total() + servo.alerts + servo.left_out > 0;
     if report.servos.iter().any(|servo| troubled(&servo)) {
         say(
             out,
