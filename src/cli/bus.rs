@@ -1,5 +1,6 @@
 //! `handwave bus`: look at and set up the servos of a bus.
 
+mod bench;
 mod ids;
 mod registers;
 mod scan;
@@ -25,7 +26,8 @@ Examples:
   handwave bus read dynamixel:/dev/ttyUSB0 1-12 present_position
   handwave bus read dynamixel:/dev/ttyUSB0 3 all
   handwave bus write dynamixel:/dev/ttyUSB0@57600 1 baud_rate 3
-  handwave bus reboot dynamixel:/dev/ttyUSB0 3")]
+  handwave bus reboot dynamixel:/dev/ttyUSB0 3
+  handwave bus bench dynamixel:/dev/ttyUSB0 --seconds 5")]
 pub struct BusArgs {
     #[command(subcommand)]
     command: BusCommand,
@@ -38,6 +40,7 @@ enum BusCommand {
     Read(registers::ReadArgs),
     Write(registers::WriteArgs),
     Reboot(RebootArgs),
+    Bench(bench::BenchArgs),
 }
 
 /// Restart servos: clears a latched hardware error; torque is off afterwards.
@@ -60,6 +63,7 @@ pub fn run(args: BusArgs) -> Result<ExitStatus, Failure> {
         BusCommand::Read(args) => registers::read(&args, &mut out),
         BusCommand::Write(args) => registers::write(&args, &mut out),
         BusCommand::Reboot(args) => reboot(&args, &mut out),
+        BusCommand::Bench(args) => bench::bench(&args, &mut out),
     }
 }
 

@@ -5,6 +5,7 @@
 //! [`session`] runs it, on a thread in real time or inline in virtual time.
 
 pub mod arrival;
+pub mod bus_bench;
 pub mod clock;
 pub mod control;
 pub mod feed;
