@@ -83,8 +83,9 @@ pub fn open(
             let line = simulated_line(character)?;
             let port = SimPort::new(line.clone(), clock, character.sim_baud);
             let port = wrap("sim", Box::new(port));
+            let options = MasterOptions::of(port.as_ref());
             (
-                Box::new(Master::new(port, MasterOptions::default())),
+                Box::new(Master::new(port, options)),
                 Some(line),
             )
         }
