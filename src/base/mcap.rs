@@ -39,10 +39,7 @@ pub struct Scan {
 ///
 /// # Errors
 /// The input cannot be read, or is no MCAP file at all.
-pub fn scan(
-    mut input: impl Read,
-    mut each: impl FnMut(Item<'_>) -> bool,
-) -> std::io::Result<Scan> {
+pub fn scan(mut input: impl Read, mut each: impl FnMut(Item<'_>) -> bool) -> std::io::Result<Scan> {
     let mut magic = [0; mcap::MAGIC.len()];
     let mut have = 0;
     while have < magic.len() {
@@ -91,15 +88,17 @@ pub fn scan(
                     Ok(Record::Attachment { header, data, .. }) => {
                         each(Item::Attachment(&header.name, &data))
                     }
-                    Ok(Record::Message { header, data }) => match channels.get(&header.channel_id) {
-                        Some(channel) => each(Item::Message {
-                            topic: &channel.topic,
-                            about: &channel.metadata,
-                            log_time_ns: header.log_time,
-                            data: &data,
-                        }),
-                        None => true,
-                    },
+                    Ok(Record::Message { header, data }) => {
+                        match channels.get(&header.channel_id) {
+                            Some(channel) => each(Item::Message {
+                                topic: &channel.topic,
+                                about: &channel.metadata,
+                                log_time_ns: header.log_time,
+                                data: &data,
+                            }),
+                            None => true,
+                        }
+                    }
                     Ok(_) => true,
                 };
                 if !goes_on {

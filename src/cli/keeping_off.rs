@@ -57,12 +57,7 @@ impl Keeping {
     pub fn taps(&self) -> Option<Taps> {
         None
     }
-    pub fn begin(
-        &mut self,
-        _: &Character,
-        _: &PoseHeader,
-        _: &HowRun<'_>,
-    ) -> Result<(), Failure> {
+    pub fn begin(&mut self, _: &Character, _: &PoseHeader, _: &HowRun<'_>) -> Result<(), Failure> {
         Ok(())
     }
     pub fn see(&mut self, _: &CycleRecord) {}

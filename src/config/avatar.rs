@@ -113,8 +113,8 @@ impl Avatar {
     ) -> Result<ClipFile, String> {
         let (file, part) = split_part(name)?;
         let (path, bytes) = motion_file(files, file)?;
-        let read = import::open_bytes(&path, &bytes, &options(self.unit_m))
-            .map_err(|e| e.to_string())?;
+        let read =
+            import::open_bytes(&path, &bytes, &options(self.unit_m)).map_err(|e| e.to_string())?;
         let names: Vec<String> = read.takes.iter().map(|t| t.name.clone()).collect();
         let Ok([take]) = <[Take; 1]>::try_from(read.takes) else {
             return Err(format!(

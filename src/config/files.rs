@@ -1,8 +1,8 @@
 //! Where the files that a configuration names are read from.
 
 use super::error::ConfigError;
-use std::os::unix::fs::MetadataExt;
 use std::collections::BTreeMap;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 

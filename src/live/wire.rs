@@ -84,10 +84,7 @@ pub fn open(
             let port = SimPort::new(line.clone(), clock, character.sim_baud);
             let port = wrap("sim", Box::new(port));
             let options = MasterOptions::of(port.as_ref());
-            (
-                Box::new(Master::new(port, options)),
-                Some(line),
-            )
+            (Box::new(Master::new(port, options)), Some(line))
         }
         BusAddress::Dynamixel {
             path,

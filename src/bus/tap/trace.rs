@@ -108,7 +108,10 @@ mod tests {
     #[test]
     fn frames_are_named() {
         let mut buf = [0; 64];
-        let ping = Instruction::Ping.encode(7, &mut buf).expect("room").to_vec();
+        let ping = Instruction::Ping
+            .encode(7, &mut buf)
+            .expect("room")
+            .to_vec();
         let mut buf = [0; 64];
         let write = Instruction::Write {
             address: 64,
@@ -116,7 +119,10 @@ mod tests {
         };
         let write = write.encode(3, &mut buf).expect("room").to_vec();
         assert_eq!(words(&ping), "ping to 7");
-        assert_eq!(words(&[ping, write].concat()), "ping to 7, write at 64 to 3");
+        assert_eq!(
+            words(&[ping, write].concat()),
+            "ping to 7, write at 64 to 3"
+        );
         assert_eq!(words(&[1, 2, 3]), "");
         assert_eq!(hex(&[0, 0xAB]), "00ab");
     }

@@ -1,7 +1,7 @@
 //! A pose sample in a log, bit for bit.
 
-use crate::bus::tap::event::{Fields, begin_pose};
 use crate::bus::tap::Entry;
+use crate::bus::tap::event::{Fields, begin_pose};
 use crate::pose::PoseSample;
 
 /// Bytes of a count.

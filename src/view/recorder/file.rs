@@ -212,8 +212,7 @@ impl McapFile {
         if let Some(id) = self.log_ids.get(piece.log) {
             self.put(*id, piece.end, &data);
         }
-        let mut events = Events::new(&piece.bytes, piece.base);
-        while let Some(event) = events.next() {
+        for event in Events::new(&piece.bytes, piece.base) {
             match event {
                 Event::Seen(tap::CYCLE_0, nanos) => self.start = Time::from_nanos(nanos as i64),
                 _ if !in_words => {}

@@ -145,7 +145,7 @@ impl Recorder {
     /// Sees every cycle, in order. Never waits.
     pub fn see(&mut self, record: &CycleRecord) {
         if let Work::Inline(keeper) = &mut self.work
-            && self.cycles % CYCLES == 0
+            && self.cycles.is_multiple_of(CYCLES)
         {
             keeper.pump();
         }
@@ -233,7 +233,7 @@ impl Keeper {
                 && file.flush_if_due()
             {
                 flushes += 1;
-                if flushes % 2 == 0 {
+                if flushes.is_multiple_of(2) {
                     file.sync();
                 }
             }

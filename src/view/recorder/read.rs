@@ -79,10 +79,7 @@ impl Collected {
                     return;
                 };
                 let name = about.get("log").cloned().unwrap_or_default();
-                let (_, pieces) = self
-                    .logs
-                    .entry(index)
-                    .or_insert_with(|| (name, Vec::new()));
+                let (_, pieces) = self.logs.entry(index).or_insert_with(|| (name, Vec::new()));
                 let base = Time::from_nanos(i64::from_le_bytes(*base));
                 pieces.push((base, bytes.to_vec()));
             }

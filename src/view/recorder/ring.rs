@@ -107,7 +107,10 @@ mod tests {
         assert!(ring.piece_bytes <= 10_000, "{} bytes", ring.piece_bytes);
         assert!(ring.message_bytes <= 2_500, "{} bytes", ring.message_bytes);
         assert!(!ring.begun);
-        assert_eq!(ring.pieces.back().map(|p| p.end), Some(Time::from_nanos(1000)));
+        assert_eq!(
+            ring.pieces.back().map(|p| p.end),
+            Some(Time::from_nanos(1000))
+        );
         assert_eq!(ring.messages.back().map(|m| m.1), Some(999.0));
         assert!(ring.messages.iter().all(|m| 999.0 - m.1 <= 60.0));
     }
