@@ -18,6 +18,7 @@ pub mod map;
 mod motion;
 mod numbers;
 mod parts;
+pub mod record;
 pub mod safety;
 mod search;
 mod servos;

@@ -13,6 +13,7 @@ pub mod footing;
 pub mod keys;
 pub mod realtime;
 pub mod record;
+pub mod recording;
 pub mod reload;
 pub mod session;
 pub mod source;

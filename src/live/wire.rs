@@ -83,10 +83,8 @@ pub fn open(
             let line = simulated_line(character)?;
             let port = SimPort::new(line.clone(), clock, character.sim_baud);
             let port = wrap("sim", Box::new(port));
-            (
-                Box::new(Master::new(port, MasterOptions::default())),
-                Some(line),
-            )
+            let options = MasterOptions::of(port.as_ref());
+            (Box::new(Master::new(port, options)), Some(line))
         }
         BusAddress::Dynamixel {
             path,

@@ -6,6 +6,8 @@ mod draw;
 mod lines;
 #[cfg(feature = "plot")]
 pub mod plot;
+#[cfg(feature = "record")]
+pub mod recorder;
 #[cfg(feature = "tui")]
 mod terminal;
 #[cfg_attr(

@@ -57,9 +57,8 @@ pub fn open(
     match backend {
         DynamixelBackend::Handwave => {
             let port = SerialPort::open(path, baud, clock)?;
-            let mut options = MasterOptions::default();
-            options.max_allowance += port.latency_timer().unwrap_or_default();
             let port = wrap(&format!("dynamixel:{path}@{baud}"), Box::new(port));
+            let options = MasterOptions::of(port.as_ref());
             Ok(Box::new(Master::new(port, options)))
         }
         #[cfg(feature = "dxl-serial2")]
