@@ -7,9 +7,11 @@
 pub mod arrival;
 pub mod clock;
 pub mod control;
+pub mod drive;
 pub mod feed;
 pub mod footing;
 pub mod keys;
+pub mod playback;
 pub mod realtime;
 pub mod record;
 pub mod reload;

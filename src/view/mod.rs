@@ -4,6 +4,7 @@
 #[cfg(feature = "tui")]
 mod draw;
 mod lines;
+pub mod servos;
 #[cfg(feature = "plot")]
 pub mod plot;
 #[cfg(feature = "tui")]

@@ -19,8 +19,10 @@ mod recovery;
 #[cfg(test)]
 mod scripted;
 pub mod servo;
+pub mod setup;
 #[cfg(test)]
 mod tests;
+pub mod vitals;
 
 #[cfg(feature = "dxl-serial2")]
 pub use backend_dynamixel2::Dynamixel2Client;
