@@ -3,6 +3,7 @@
 use super::{ExitStatus, Failure, say, warn};
 use crate::base::Clock;
 use crate::base::suggest::nearest;
+use crate::bus::dynamixel::model::PULSES_PER_TURN;
 use crate::live::{RealClock, realtime};
 use crate::sim::fault::FAULTS;
 use crate::sim::line::SharedLine;
@@ -40,6 +41,9 @@ A servo set to another baud rate than the client's port is silent. A reboot take
 FIRMWARE is a version, as in xl330-m288@47: fast reads need 45 (46 on the 330 size; MX and PH42 have none), a bus watchdog 38,
 and the indirect data of the 330 size lies at 224 before 52, at 208 from then on.
 Behind a servo that stays silent in a sync or bulk read, the others answer when its time is over; a fast read ends there.
+
+Standard input is the hand at the servos: 'plug N' and 'unplug N', and 'turn N DEGREES' turns a shaft whose torque is off
+(N as in --servos).
 
 Examples:
   handwave sim dynamixel --servos 1-12 --link /tmp/servos
@@ -114,9 +118,7 @@ fn dynamixel(args: &DynamixelArgs) -> Result<ExitStatus, Failure> {
     }
     let mut server = PtyServer::open(line.clone(), Arc::clone(&clock), link, port_baud)
         .map_err(Failure::input)?;
-    if args.factory {
-        std::thread::spawn(move || follow_plugs(&line, clock.as_ref()));
-    }
+    std::thread::spawn(move || follow_hands(&line, clock.as_ref()));
     // A wire does not wait for the scheduler; without the right to it all still works.
     let _best_effort = realtime::request();
     say(format_args!("ready {}", link.display()));
@@ -224,26 +226,32 @@ fn parse_servos(list: &str) -> Result<Vec<Asked>, String> {
     Ok(servos)
 }
 
-/// Takes `plug N` and `unplug N` from standard input until it ends.
-fn follow_plugs(line: &SharedLine, clock: &dyn Clock) {
+/// How fast a hand turns a shaft, degrees per second, and how often it moves it on, seconds.
+const HAND_DEG_S: f64 = 180.0;
+const HAND_STEP_S: f64 = 0.005;
+
+/// Takes `plug N`, `unplug N` and `turn N DEG` from standard input until it ends.
+fn follow_hands(line: &SharedLine, clock: &dyn Clock) {
     for command in std::io::stdin().lock().lines().map_while(Result::ok) {
         let words: Vec<&str> = command.split_whitespace().collect();
-        let plugged = match words.first() {
-            Some(&"plug") => true,
-            Some(&"unplug") => false,
-            None => continue,
-            Some(_) => {
+        let label = words.get(1).and_then(|word| word.parse().ok());
+        let degrees = words.get(2).and_then(|word| word.parse::<f64>().ok());
+        let found = match (words.as_slice(), label) {
+            ([], _) => continue,
+            (["plug" | "unplug", _], Some(label)) => {
+                let now = clock.now();
+                line.lock().set_plugged(label, words[0] == "plug", now)
+            }
+            (["turn", _, _], Some(label)) if degrees.is_some_and(|d| d.abs() <= 3600.0) => {
+                turn(line, clock, label, degrees.unwrap_or(0.0))
+            }
+            _ => {
                 warn(format_args!(
-                    "expected 'plug N' or 'unplug N', found '{command}'"
+                    "expected 'plug N', 'unplug N' or 'turn N DEGREES', found '{command}'"
                 ));
                 continue;
             }
         };
-        let label = words.get(1).and_then(|word| word.parse().ok());
-        let found = label.is_some_and(|label| {
-            let now = clock.now();
-            line.lock().set_plugged(label, plugged, now)
-        });
         if !found {
             let labels: Vec<_> = line.lock().labels().map(|l| l.to_string()).collect();
             warn(format_args!(
@@ -252,6 +260,30 @@ fn follow_plugs(line: &SharedLine, clock: &dyn Clock) {
             ));
         }
     }
+}
+
+/// Turns the shaft of servo `label` by hand, at a hand's speed; false when there is no such servo.
+fn turn(line: &SharedLine, clock: &dyn Clock, label: u8, degrees: f64) -> bool {
+    let steps = (degrees.abs() / HAND_DEG_S / HAND_STEP_S).ceil().max(1.0);
+    let pulses = degrees / 360.0 * PULSES_PER_TURN / steps;
+    for _ in 0..steps as u32 {
+        let turned = line
+            .lock()
+            .servo_mut(label)
+            .map(|servo| servo.turn_by_hand(pulses));
+        match turned {
+            None => return false,
+            Some(true) => {}
+            Some(false) => {
+                warn(format_args!(
+                    "the torque of servo {label} is on and holds it"
+                ));
+                return true;
+            }
+        }
+        clock.sleep_until(clock.now() + Duration::from_secs_f64(HAND_STEP_S));
+    }
+    true
 }
 
 #[cfg(test)]

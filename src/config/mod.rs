@@ -9,6 +9,7 @@ pub mod body;
 pub mod build;
 mod channel;
 mod class;
+pub mod edit;
 pub mod error;
 pub mod file;
 pub mod files;

@@ -146,6 +146,16 @@ impl Servo {
         self.table.get(addr)
     }
 
+    /// Turns the shaft by hand, by `pulses` in the register's direction; false when torque is on and holds it.
+    pub fn turn_by_hand(&mut self, pulses: f64) -> bool {
+        let free = !self.setpoint.torque_on;
+        if free {
+            self.motor.angle_rad += pulses * PULSE_RAD * self.setpoint.direction;
+            self.motor.speed_rad_s = 0.0;
+        }
+        free
+    }
+
     /// Pushes the shaft with a torque from outside, N m, in the direction of growing pulses.
     pub fn set_external_torque(&mut self, torque_nm: f64) {
         self.motor.external_nm = torque_nm * self.setpoint.direction;

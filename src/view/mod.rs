@@ -8,6 +8,7 @@ mod lines;
 pub mod plot;
 #[cfg(feature = "record")]
 pub mod recorder;
+pub mod servos;
 #[cfg(feature = "tui")]
 mod terminal;
 #[cfg_attr(

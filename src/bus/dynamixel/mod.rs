@@ -24,8 +24,10 @@ mod recovery;
 mod scripted;
 pub mod servo;
 pub mod settings;
+pub mod setup;
 #[cfg(test)]
 mod tests;
+pub mod vitals;
 
 #[cfg(feature = "dxl-serial2")]
 pub use backend_dynamixel2::Dynamixel2Client;
