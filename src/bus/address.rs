@@ -86,6 +86,26 @@ impl Buses {
             .all(|line| line.address == BusAddress::Sim)
     }
 
+    /// Puts a simulated line in place of each bus; buses that share a port share the line of the first.
+    pub fn simulate(&mut self) {
+        let first = |address: &BusAddress| self.lines.iter().position(|l| l.address == *address);
+        let shared: Vec<usize> = self
+            .lines
+            .iter()
+            .enumerate()
+            .map(|(index, line)| match &line.address {
+                BusAddress::Sim => index,
+                port => first(port).unwrap_or(index),
+            })
+            .collect();
+        for bus in &mut self.of_joint {
+            *bus = shared.get(*bus).copied().unwrap_or(*bus);
+        }
+        for line in &mut self.lines {
+            line.address = BusAddress::Sim;
+        }
+    }
+
     /// Puts `choice` in place of the bus that it names; without a name, of every bus of its kind. A simulated
     /// line stands for any kind.
     ///

@@ -10,6 +10,7 @@ mod no_servos;
 pub mod parallel;
 pub mod port;
 pub mod serial;
+pub mod tap;
 
 use crate::base::{JointState, Time};
 pub use address::{AddressError, BusAddress, BusChoice, BusLine, Buses, DynamixelBackend};

@@ -58,7 +58,8 @@ pub struct ParallelBus {
     facts: Vec<ServoFacts>,
     health: Vec<ServoHealth>,
     notes: Vec<String>,
-    clock: Arc<dyn Clock>,
+    /// In virtual time: the clock that the branches come from. Time that passes by itself is not asked for.
+    clock: Option<Arc<dyn Clock>>,
 }
 
 impl ParallelBus {
@@ -87,6 +88,7 @@ impl ParallelBus {
                 return Err(ParallelError::Joint { joint, found });
             }
         }
+        let branched = parts.iter().any(|part| part.branch.is_some());
         let lanes = parts
             .into_iter()
             .map(|part| Lane::new(part, &joints, enter))
@@ -97,13 +99,26 @@ impl ParallelBus {
             joints,
             lanes,
             notes: Vec::new(),
-            clock,
+            clock: Some(clock).filter(|_| branched),
         })
+    }
+
+    /// The time, where it has to be moved on.
+    fn now(&self) -> Time {
+        self.clock.as_ref().map_or(Time::ZERO, |clock| clock.now())
+    }
+
+    fn move_on(&self, end: Time) {
+        if let Some(clock) = &self.clock
+            && clock.now() < end
+        {
+            clock.sleep_until(end);
+        }
     }
 
     /// Has `job` done by all lanes that `wanted` picks, at the same time. Their results are in the lanes.
     fn all(&mut self, job: Job, wanted: impl Fn(&Lane) -> bool) {
-        let begin = self.clock.now();
+        let begin = self.now();
         let last = self.lanes.iter().rposition(&wanted);
         for (index, lane) in self.lanes.iter_mut().enumerate() {
             // Decided now: a part that is away is not wanted by the looks of it.
@@ -120,9 +135,7 @@ impl ParallelBus {
             lane.wait();
             end = end.max(lane.time().unwrap_or(begin));
         }
-        if end > begin {
-            self.clock.sleep_until(end);
-        }
+        self.move_on(end);
     }
 
     /// The first lane's error that has not been told yet.
@@ -159,16 +172,16 @@ impl ParallelBus {
         joint: usize,
         work: impl FnOnce(&mut dyn ServoBus, usize) -> Result<(), BusError>,
     ) -> Result<(), BusError> {
-        let begin = self.clock.now();
+        let begin = self.now();
         for lane in &mut self.lanes {
             let Some(place) = lane.joints.iter().position(|&own| own == joint) else {
                 continue;
             };
             let done = lane.here(begin, |bus| work(bus, place));
-            if let Some(end) = lane.time().filter(|end| *end > begin) {
-                self.clock.sleep_until(end);
-            }
-            return done.map_err(|error| lane.named(error));
+            let done = done.map_err(|error| lane.named(error));
+            let end = lane.time().unwrap_or(begin);
+            self.move_on(end);
+            return done;
         }
         Ok(())
     }
@@ -324,7 +337,7 @@ impl ServoBus for ParallelBus {
     /// Begins to look for every lost bus and returns at once; the workers do it while the others are
     /// exchanged. Succeeds in the call in which none is lost any more.
     fn reopen(&mut self) -> Result<(), BusError> {
-        let now = self.clock.now();
+        let now = self.now();
         let mut missing = None;
         for lane in self.lanes.iter_mut().filter(|lane| lane.lost) {
             match lane.search(now) {

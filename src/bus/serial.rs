@@ -182,6 +182,10 @@ impl Port for SerialPort {
     fn close(&mut self) {
         self.tty = None;
     }
+
+    fn latency_timer(&self) -> Option<Duration> {
+        self.latency_timer
+    }
 }
 
 /// Opens the terminal for this process alone and empties it.

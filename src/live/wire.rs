@@ -10,8 +10,8 @@ use crate::bus::parallel::{BusPart, ParallelError};
 use crate::bus::port::WrapPort;
 use crate::bus::{BusAddress, BusLine, Buses, NoServos, ParallelBus, PortError, ServoBus};
 use crate::config::Character;
-use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
-use handwave_dynamixel::baud::RateList;
+use crate::sim::{self, FaultSpec, Line, LineOptions, Servo, SharedLine, SimPort};
+use handwave_dynamixel::baud::{self, RateList};
 use handwave_dynamixel::wire;
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
@@ -113,7 +113,8 @@ pub fn open(
                 let line = simulated_line(&chain.servos, baud)?;
                 lines.push(line.clone());
                 let port = wrap(&options.bus, Box::new(SimPort::new(line, own, baud)));
-                Box::new(Master::new(port, MasterOptions::default()))
+                let options = MasterOptions::of(port.as_ref());
+                Box::new(Master::new(port, options))
             }
             BusAddress::Dynamixel {
                 path,
@@ -180,12 +181,16 @@ fn chains<'a>(character: &Character, buses: &'a Buses) -> Vec<ChainParts<'a>> {
     chains
 }
 
-fn simulated_line(servos: &[ServoSpec], baud: u32) -> Result<SharedLine, WireError> {
-    let name = servos.first().map_or("", |s| s.model.name);
-    let device = sim::models::model(name).ok_or_else(|| WireError::Model(name.into()))?;
-    let ids = servos.iter().map(|s| s.id);
-    let line = Line::commissioned(device, ids, baud, LineOptions::default())
-        .ok_or(WireError::Baud { baud })?;
+/// Servos as commissioned for a character: model and mode are those that it wants.
+fn simulated_line(servos: &[ServoSpec], rate: u32) -> Result<SharedLine, WireError> {
+    let code = baud::code(rate).ok_or(WireError::Baud { baud: rate })?;
+    let mut line = Line::new(LineOptions::default());
+    for spec in servos {
+        let name = spec.model.name;
+        let device = sim::models::model(name).ok_or_else(|| WireError::Model(name.into()))?;
+        let servo = Servo::commissioned(device, spec.id, code).with_mode(spec.mode);
+        line.attach(spec.id, servo);
+    }
     Ok(SharedLine::new(line))
 }
 

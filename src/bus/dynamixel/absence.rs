@@ -25,7 +25,7 @@ impl DynamixelChain {
         let Some(index) = self.servos.iter().position(|servo| servo.spec.id == id) else {
             return error;
         };
-        let (speaks, garbled) = self.listen_to(id);
+        let (speaks, garbled) = self.listen_to(index);
         if garbled > 0 {
             let bus = &self.options.bus;
             let free = (1..=252).find(|id| self.servos.iter().all(|s| s.spec.id != *id));
@@ -49,8 +49,10 @@ impl DynamixelChain {
         }
     }
 
-    /// Whether servo `id` answers clearly, and how many of its answers are garbled.
-    fn listen_to(&mut self, id: u8) -> (bool, u32) {
+    /// Whether servo `index` answers clearly, and how many of its answers are garbled.
+    fn listen_to(&mut self, index: usize) -> (bool, u32) {
+        let spec = &self.servos[index].spec;
+        let (id, present) = (spec.id, spec.at(address::PRESENT_STATE));
         let (mut speaks, mut garbled) = (false, 0);
         for look in 0..2 * LOOKS {
             // Two servos of one model say the same to a ping, and stand in different places.
@@ -59,9 +61,7 @@ impl DynamixelChain {
                 self.client.ping(id).is_ok()
             } else {
                 let mut state = [0; STATE_BYTES];
-                self.client
-                    .read(id, address::PRESENT_STATE, &mut state)
-                    .is_ok()
+                self.client.read(id, present, &mut state).is_ok()
             };
             speaks |= answered;
             // What comes after the end of the wait counts too. A lost port shows up in the next request.

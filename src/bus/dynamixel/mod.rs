@@ -13,7 +13,11 @@ pub mod chain;
 mod check;
 pub mod client;
 mod cycle;
+mod facts;
+mod follow;
+mod goals;
 mod group_read;
+mod groups;
 mod health;
 pub mod master;
 pub mod model;
@@ -23,8 +27,11 @@ mod requests;
 #[cfg(test)]
 mod scripted;
 pub mod servo;
+pub mod settings;
+pub mod setup;
 #[cfg(test)]
 mod tests;
+pub mod vitals;
 
 #[cfg(feature = "dxl-serial2")]
 pub use backend_dynamixel2::Dynamixel2Client;
@@ -32,8 +39,9 @@ pub use chain::{ChainOptions, DynamixelChain};
 pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
 pub use handwave_dynamixel::instruction::{Backup, BulkReadEntry, BulkWriteEntry, FactoryReset};
 pub use master::{Master, MasterOptions};
-pub use model::{Model, Protocol, Register};
+pub use model::{Mode, Model, Protocol, Register};
 pub use servo::{Direction, ServoSpec, SpecError};
+pub use settings::{Follow, Gains, Profile, Settings};
 
 use super::address::DynamixelBackend;
 use super::port::{PortError, WrapPort};
@@ -56,10 +64,9 @@ pub fn open(
     match backend {
         DynamixelBackend::Handwave => {
             let port = SerialPort::open(path, baud, clock)?;
-            let mut options = MasterOptions::default();
-            options.first_allowance += port.latency_timer().unwrap_or_default();
             let notes = port.latency_note().into_iter().collect();
             let port = wrap(&format!("dynamixel:{path}@{baud}"), Box::new(port));
+            let options = MasterOptions::of(port.as_ref());
             Ok(Box::new(Master::new(port, options).with_notes(notes)))
         }
         #[cfg(feature = "dxl-serial2")]
