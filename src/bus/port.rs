@@ -1,6 +1,7 @@
 //! The seam to the wire: a half-duplex byte port with deadlines.
 
 use crate::base::Time;
+use std::time::Duration;
 
 /// Why a port failed. Any of these means that the bus is lost until the port is opened again.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +60,30 @@ pub trait Port: Send {
     fn read(&mut self, buf: &mut [u8], want: usize, deadline: Time) -> Result<usize, PortError>;
     /// Throws away what was received and not yet read.
     fn discard_input(&mut self) -> Result<(), PortError>;
+    /// How long an adapter keeps received bytes back before it sends them on, where it has such a timer.
+    fn latency_timer(&self) -> Option<Duration> {
+        None
+    }
+
+    /// Names under which this port may be found after it was lost, the likeliest first; none for a port
+    /// that cannot come back. A port around another one passes this and the three below on to it.
+    fn candidates(&self) -> Vec<String> {
+        Vec::new()
+    }
+    /// What a lost port is recognised by, for messages.
+    fn sought(&self) -> String {
+        self.name().to_owned()
+    }
+    /// Opens the port `name` in place of this one, which is closed before, at the same rate.
+    fn reopen(&mut self, name: &str) -> Result<(), PortError> {
+        Err(PortError::Open {
+            port: name.to_owned(),
+            reason: "this kind of port cannot be opened again".to_owned(),
+            advice: "Start again".to_owned(),
+        })
+    }
+    /// Lets go of the port until it is [reopened](Self::reopen), so that others can have it.
+    fn close(&mut self) {}
 }
 
 /// Puts something around each port as it is opened, such as a tap that records its bytes: takes the

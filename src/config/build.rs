@@ -11,9 +11,11 @@ use super::layer::{LayerParts, layer_parts};
 use super::motion::{GraphParts, clip, graph_parts, neighbourhoods, read};
 use super::numbers::check_numbers;
 use super::parts::{Parts, parts};
+use super::record::{RecordOptions, record_options};
 use super::safety::Safety;
 use super::search::{SearchParts, search_parts};
-use crate::bus::BusAddress;
+use super::servos::check_stopping;
+use crate::bus::Buses;
 use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{
     EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet, PerformerScale,
@@ -37,6 +39,8 @@ pub struct Character {
     pub name: String,
     /// The configuration's name for messages.
     pub config_name: String,
+    /// The configuration's name among its files.
+    pub config_file: String,
     /// Where its files are.
     pub files: Files,
     /// Pose source as written, such as `file:performances/x.csv`.
@@ -59,10 +63,8 @@ pub struct Character {
     pub limits: Vec<JointEnvelope>,
     /// Class names with the gesture that drives each, in node order.
     pub classes: Vec<ClassParts>,
-    /// Bus as written.
-    pub bus: BusAddress,
-    /// Baud rate of the simulated line.
-    pub sim_baud: u32,
+    /// Its bus or buses, and which of them carries each joint.
+    pub bus: Buses,
     /// Control cycles per second.
     pub rate_hz: f64,
     /// Servo-side watchdog, ms; 0 is off.
@@ -73,6 +75,8 @@ pub struct Character {
     pub safety: Safety,
     /// Pictures per second of the terminal view.
     pub view_hz: f64,
+    /// What is kept of runs.
+    pub record: RecordOptions,
     graph: GraphParts,
     search: Option<SearchParts>,
     layers: Vec<LayerParts>,
@@ -190,6 +194,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         None => EstimatorKind::default(),
     };
     let safety = Safety::of(&file.safety, &gestures, &at)?;
+    check_stopping(&servos, safety.on_exit, wire.watchdog_ms, &at)?;
     let front_options = FrontEndOptions {
         estimator,
         lambda: file.input.window,
@@ -199,16 +204,17 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let character = Character {
         name: file.name.clone(),
         config_name: file_name.clone(),
+        config_file: name.into(),
         source: file.input.source.get_ref().clone(),
         front_options,
         gesture_texts: (paths, texts),
         reload: file.input.reload,
         safety,
         bus: wire.bus,
-        sim_baud: wire.baud,
         rate_hz: wire.rate_hz,
         watchdog_ms: wire.watchdog_ms,
         view_hz: file.view.refresh_hz,
+        record: record_options(&file.record, &files, &at)?,
         files,
         model,
         body,

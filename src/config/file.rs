@@ -1,10 +1,12 @@
 //! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`,
 //! `[[channel]]` in `configs/face.toml`, `map` in `configs/arm.toml`.
 
+mod record;
 mod robot;
 mod safety;
 
-pub use robot::{BusEntry, JointEntry, RobotEntry};
+pub use record::RecordEntry;
+pub use robot::{BusEntries, BusEntry, JointEntry, RobotEntry};
 pub use safety::{OnBusLost, OnExit, OnLost, OnOverrun, OnServoFault, Rearm, SafetyEntry};
 
 use serde::Deserialize;
@@ -35,8 +37,8 @@ pub struct CharacterFile {
     pub graph: GraphEntry,
     /// The robot; it needs a bus.
     pub robot: Option<RobotEntry>,
-    /// The bus.
-    pub bus: Option<BusEntry>,
+    /// The bus, or several.
+    pub bus: Option<BusEntries>,
     /// Instead of robot and bus: an avatar.
     pub avatar: Option<AvatarEntry>,
     /// Ramps, safe states, what to do when something is lost.
@@ -45,6 +47,9 @@ pub struct CharacterFile {
     /// The terminal view.
     #[serde(default)]
     pub view: ViewEntry,
+    /// What is kept of runs.
+    #[serde(default)]
+    pub record: RecordEntry,
 }
 
 /// Where poses come from.

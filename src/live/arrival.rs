@@ -179,7 +179,7 @@ impl<P: Read + AsFd> Read for PipeInput<P> {
 }
 
 /// Whether something (or the end) can be read from `fd` within `wait`.
-pub(super) fn is_readable(fd: impl AsFd, wait: Duration) -> io::Result<bool> {
+pub(crate) fn is_readable(fd: impl AsFd, wait: Duration) -> io::Result<bool> {
     let timeout = Timespec {
         tv_sec: i64::try_from(wait.as_secs()).unwrap_or(i64::MAX),
         tv_nsec: wait.subsec_nanos().into(),

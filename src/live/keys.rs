@@ -35,13 +35,7 @@ impl Keys {
 
     /// The next mark that a key gave, if there is one. Does not wait.
     pub fn mark(&mut self) -> Option<Mark> {
-        let mut chunk = [0; 64];
-        while is_readable(stdin(), Duration::ZERO).unwrap_or(false) {
-            match rustix::io::read(stdin(), &mut chunk) {
-                Ok(count) if count > 0 => self.bytes.extend_from_slice(&chunk[..count]),
-                _ => break,
-            }
-        }
+        self.fill();
         while !self.bytes.is_empty() {
             let (length, mark) = first_key(&self.bytes);
             self.bytes.drain(..length);
@@ -50,6 +44,26 @@ impl Keys {
             }
         }
         None
+    }
+
+    /// The next key, as the bytes that it sends: one for a letter, an escape sequence for an arrow. Does not wait.
+    pub fn key(&mut self) -> Option<Vec<u8>> {
+        self.fill();
+        if self.bytes.is_empty() {
+            return None;
+        }
+        let (length, _) = first_key(&self.bytes);
+        Some(self.bytes.drain(..length).collect())
+    }
+
+    fn fill(&mut self) {
+        let mut chunk = [0; 64];
+        while is_readable(stdin(), Duration::ZERO).unwrap_or(false) {
+            match rustix::io::read(stdin(), &mut chunk) {
+                Ok(count) if count > 0 => self.bytes.extend_from_slice(&chunk[..count]),
+                _ => break,
+            }
+        }
     }
 }
 

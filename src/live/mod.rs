@@ -5,13 +5,17 @@
 //! [`session`] runs it, on a thread in real time or inline in virtual time.
 
 pub mod arrival;
+pub mod bus_bench;
 pub mod clock;
 pub mod control;
+pub mod drive;
 pub mod feed;
 pub mod footing;
 pub mod keys;
+pub mod playback;
 pub mod realtime;
 pub mod record;
+pub mod recording;
 pub mod reload;
 pub mod safety;
 pub mod session;

@@ -11,6 +11,7 @@ pub mod leg;
 mod limits;
 pub mod model;
 pub mod tip;
+mod words;
 
 pub use envelope::{Envelope, JointEnvelope};
 pub use ik::ChainIk;

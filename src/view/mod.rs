@@ -6,6 +6,9 @@ mod draw;
 mod lines;
 #[cfg(feature = "plot")]
 pub mod plot;
+#[cfg(feature = "record")]
+pub mod recorder;
+pub mod servos;
 #[cfg(feature = "tui")]
 mod terminal;
 #[cfg_attr(

@@ -5,6 +5,7 @@
 //! `dynamixel2` crate as a second implementation (feature `dxl-serial2`); [`model`] says
 //! what the registers mean; [`DynamixelChain`] is the [`ServoBus`](super::ServoBus) in joint angles.
 
+mod absence;
 mod allowance;
 #[cfg(feature = "dxl-serial2")]
 pub mod backend_dynamixel2;
@@ -12,23 +13,35 @@ pub mod chain;
 mod check;
 pub mod client;
 mod cycle;
+mod facts;
+mod follow;
+mod goals;
 mod group_read;
+mod groups;
+mod health;
 pub mod master;
 pub mod model;
 mod recovery;
+mod reopen;
+mod requests;
 #[cfg(test)]
 mod scripted;
 pub mod servo;
+pub mod settings;
+pub mod setup;
 #[cfg(test)]
 mod tests;
+pub mod vitals;
 
 #[cfg(feature = "dxl-serial2")]
 pub use backend_dynamixel2::Dynamixel2Client;
 pub use chain::{ChainOptions, DynamixelChain};
 pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
+pub use handwave_dynamixel::instruction::{Backup, BulkReadEntry, BulkWriteEntry, FactoryReset};
 pub use master::{Master, MasterOptions};
-pub use model::{Model, Protocol, Register};
+pub use model::{Mode, Model, Protocol, Register};
 pub use servo::{Direction, ServoSpec, SpecError};
+pub use settings::{Follow, Gains, Profile, Settings};
 
 use super::address::DynamixelBackend;
 use super::port::{PortError, WrapPort};
@@ -51,10 +64,10 @@ pub fn open(
     match backend {
         DynamixelBackend::Handwave => {
             let port = SerialPort::open(path, baud, clock)?;
-            let mut options = MasterOptions::default();
-            options.max_allowance += port.latency_timer().unwrap_or_default();
+            let notes = port.latency_note().into_iter().collect();
             let port = wrap(&format!("dynamixel:{path}@{baud}"), Box::new(port));
-            Ok(Box::new(Master::new(port, options)))
+            let options = MasterOptions::of(port.as_ref());
+            Ok(Box::new(Master::new(port, options).with_notes(notes)))
         }
         #[cfg(feature = "dxl-serial2")]
         DynamixelBackend::Dynamixel2 => Ok(Box::new(Dynamixel2Client::open(path, baud, clock)?)),

@@ -3,7 +3,7 @@
 use super::{IdList, open, say};
 use crate::base::suggest;
 use crate::bus::BusAddress;
-use crate::bus::dynamixel::model::{Access, address};
+use crate::bus::dynamixel::model::{Access, Layout, address};
 use crate::bus::dynamixel::{Client, Model, Register};
 use crate::cli::{ExitStatus, Failure};
 use clap::Args;
@@ -38,7 +38,8 @@ pub struct ReadArgs {
 Examples:
   handwave bus write dynamixel:/dev/ttyUSB0 1-12 return_delay_time 0
   handwave bus write dynamixel:/dev/ttyUSB0 3 torque_enable 0
-  handwave bus write dynamixel:/dev/ttyUSB0 3 65:1 1")]
+  handwave bus write dynamixel:/dev/ttyUSB0 3 65:1 1
+  handwave bus write dynamixel:/dev/ttyUSB0 3 goal_position 2100 --later    then `bus action`")]
 pub struct WriteArgs {
     /// The bus, such as dynamixel:/dev/ttyUSB0@1000000.
     #[arg(value_name = "BUS")]
@@ -52,6 +53,9 @@ pub struct WriteArgs {
     /// Whole number, also as 0x10.
     #[arg(value_name = "VALUE", allow_hyphen_values = true, value_parser = parse_value)]
     value: i64,
+    /// The servo holds the write until `handwave bus action`.
+    #[arg(long)]
+    later: bool,
 }
 
 pub fn read(args: &ReadArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure> {
@@ -98,15 +102,27 @@ pub fn write(args: &WriteArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
     // All servos are looked at before the first is written.
     let mut plan = Vec::new();
     for id in args.ids.iter() {
-        let register = Servo::ask(&mut *client, id)?.register(&args.item)?;
-        check_write(&mut *client, &args.bus, id, &register, args.value)?;
-        plan.push((id, register));
+        let servo = Servo::ask(&mut *client, id)?;
+        let register = servo.register(&args.item)?;
+        check_write(&mut *client, &args.bus, &servo, &register, args.value)?;
+        plan.push((id, servo.layout(), register));
     }
-    for (id, register) in plan {
-        if register.address == address::TORQUE_ENABLE && args.value == 1 {
-            hold_position(&mut *client, id)?;
+    for (id, layout, register) in plan {
+        if register.address == layout.at(address::TORQUE_ENABLE) && args.value == 1 {
+            hold_position(&mut *client, id, layout)?;
         }
         let bytes = register.encode(args.value);
+        if args.later {
+            client.reg_write(id, register.address, &bytes[..usize::from(register.size)])?;
+            say(
+                out,
+                format_args!(
+                    "servo {id}: {} = {} held until the action",
+                    register.name, args.value
+                ),
+            )?;
+            continue;
+        }
         client.write(id, register.address, &bytes[..usize::from(register.size)])?;
         if matches!(register.name, "id" | "baud_rate") {
             // From now on it answers elsewhere.
@@ -132,10 +148,11 @@ pub fn write(args: &WriteArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
 fn check_write(
     client: &mut dyn Client,
     bus: &BusAddress,
-    id: u8,
+    servo: &Servo,
     register: &Register,
     value: i64,
 ) -> Result<(), Failure> {
+    let (id, layout) = (servo.id, servo.layout());
     let name = register.name;
     if register.access == Access::Read {
         return Err(Failure::input(format_args!("{name} is read-only")));
@@ -146,9 +163,9 @@ fn check_write(
             register.min, register.max
         )));
     }
-    if register.is_eeprom() {
+    if layout.is_eeprom(register.address) {
         let mut torque = [0];
-        client.read(id, address::TORQUE_ENABLE, &mut torque)?;
+        client.read(id, layout.at(address::TORQUE_ENABLE), &mut torque)?;
         if torque != [0] {
             return Err(Failure::bus(format_args!(
                 "servo {id} has its torque on, and {name} can be written only while it is off. \
@@ -160,11 +177,11 @@ fn check_write(
 }
 
 /// Makes the present position the goal, so that torque does not start a motion.
-fn hold_position(client: &mut dyn Client, id: u8) -> Result<(), Failure> {
+fn hold_position(client: &mut dyn Client, id: u8, layout: Layout) -> Result<(), Failure> {
     let mut position = [0; 4];
-    client.read(id, address::PRESENT_POSITION, &mut position)?;
+    client.read(id, layout.at(address::PRESENT_POSITION), &mut position)?;
     // In modes without a goal position it is refused, and nothing is lost.
-    match client.write(id, address::GOAL_POSITION, &position) {
+    match client.write(id, layout.at(address::GOAL_POSITION), &position) {
         Ok(_) | Err(crate::bus::dynamixel::ClientError::Refused { .. }) => Ok(()),
         Err(error) => Err(error.into()),
     }
@@ -193,6 +210,11 @@ impl Servo {
             number: ping.model,
             model: Model::by_number(ping.model),
         })
+    }
+
+    /// Where its registers lie; those of an unknown model as on X series servos.
+    fn layout(&self) -> Layout {
+        self.model.map_or(Layout::X, |model| model.layout)
     }
 
     fn model(&self) -> Result<&'static Model, Failure> {

@@ -88,7 +88,7 @@ impl Run<'_, '_> {
                     }
                     self.stats.missed += u64::from(self.parts.clock.now() > next);
                 }
-                self.record(t_s, report, late_s, step_us);
+                self.record(t_s, report, late_s, step_us, self.cycle == last);
                 let stage = self.parts.puppet.stage();
                 if stage == Stage::Playing && !self.input_begun {
                     self.parts.feed.begin(t_s + dt_s);
@@ -141,7 +141,7 @@ impl Run<'_, '_> {
         step_us
     }
 
-    fn record(&mut self, t_s: f64, report: CycleReport, late_s: f64, step_us: u64) {
+    fn record(&mut self, t_s: f64, report: CycleReport, late_s: f64, step_us: u64, sent: bool) {
         let waits = self.waits();
         let Some(record) = self.parts.recorder.slot() else {
             return;
@@ -152,6 +152,9 @@ impl Run<'_, '_> {
         record.late_us = (late_s * 1e6) as u64;
         record.step_us = step_us;
         record.overruns = self.stats.overruns;
+        record.missed = self.stats.missed;
+        record.pose_to_wire_us = self.stats.latest_pose_to_wire_us.filter(|_| sent);
+        record.fill_health(self.parts.bus.health());
         record.robot = self.supervisor.robot();
         record.vigour = self.supervisor.vigour();
         record.waits = waits;

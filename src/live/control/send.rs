@@ -53,12 +53,12 @@ impl Run<'_, '_> {
         let began = self.parts.clock.now();
         let targets = &self.parts.puppet.targets().positions;
         let report = self.parts.bus.exchange(targets, &mut self.states)?;
-        if let Some(arrived_s) = fresh.newest_sample_s {
+        self.stats.latest_pose_to_wire_us = fresh.newest_sample_s.map(|arrived_s| {
             let sent = began + Duration::from_micros(u64::from(report.goal_sent_us));
-            let waited_s = sent.secs_since(self.start) - arrived_s;
-            self.stats
-                .pose_to_wire
-                .add((waited_s.max(0.0) * 1e6) as u64);
+            ((sent.secs_since(self.start) - arrived_s).max(0.0) * 1e6) as u64
+        });
+        if let Some(waited_us) = self.stats.latest_pose_to_wire_us {
+            self.stats.pose_to_wire.add(waited_us);
         }
         Ok(report)
     }
