@@ -360,6 +360,7 @@ impl Character {
                 classes: self.classes.clone(),
                 channels: self.channels.clone(),
                 config_name: self.config_name.clone(),
+                stop_gesture: (self.safety.stop_gesture.as_ref()).map(|g| g.name.clone()),
             },
         )
     }

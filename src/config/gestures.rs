@@ -34,6 +34,8 @@ pub(super) struct Reader {
     pub classes: Vec<ClassParts>,
     pub channels: Vec<ChannelParts>,
     pub config_name: String,
+    /// The gesture that stops a run, by name.
+    pub stop_gesture: Option<String>,
 }
 
 /// A front end of changed gesture files.
@@ -179,6 +181,13 @@ impl GestureFiles {
                 Ok(Some(index))
             })
             .collect::<Result<Vec<_>, String>>()?;
+        if let Some(name) = &self.reader.stop_gesture
+            && set.index_of(name) != place(name)
+        {
+            return Err(format!(
+                "gesture `{name}` stops the run (safety.stop_gesture), and it or one before it is gone; define it again"
+            ));
+        }
         let reader = &mut self.reader;
         let mut options = reader.options;
         if let Some(scale) = scale {

@@ -30,12 +30,15 @@ pub(super) enum Wire {
 /// The time from one look for a lost bus to the next.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
+/// A servo said no or is missing: the line itself is not lost.
+fn is_refusal(error: &BusError) -> bool {
+    matches!(error, BusError::Servo { .. } | BusError::Absent { .. })
+}
+
 impl Run<'_, '_> {
     /// Takes note of a lost bus, or gives the error back when the policy is to end.
     pub(super) fn lose(&mut self, error: BusError) -> Result<(), BusError> {
-        // Anything else is a servo's refusal, not a lost line.
-        let lost = !matches!(error, BusError::Servo { .. } | BusError::Absent { .. });
-        if !lost || self.options.on_bus_lost == OnBusLost::Exit {
+        if is_refusal(&error) || self.options.on_bus_lost == OnBusLost::Exit {
             self.supervisor.lost();
             self.note_changes();
             return Err(error);
@@ -80,8 +83,9 @@ impl Run<'_, '_> {
                 let _ = self.parts.stop.take_rearm();
                 Wire::Waiting { error }
             }
-            Err(_) => Wire::Lost {
-                error,
+            Err(newer) => Wire::Lost {
+                // That a servo refuses is what somebody can mend; that nothing is there is known.
+                error: if is_refusal(&newer) { newer } else { error },
                 try_at: self.parts.clock.now() + LOOK_EVERY,
             },
         }

@@ -110,7 +110,10 @@ impl FaultKind {
                 format!("{} (register 70 = {bits:#04x})", error_names(bits))
             }
             FaultKind::FollowingError => beside("rad from its targets", 2),
-            FaultKind::Stall => beside("of its effort, standing", 2),
+            FaultKind::Stall => format!(
+                "it does not move, with up to {:.0} % of its effort",
+                100.0 * value
+            ),
             FaultKind::Warm | FaultKind::Hot => beside("degrees C", 0),
             FaultKind::Strained | FaultKind::Overload => beside("effort (RMS)", 2),
             FaultKind::WeakSupply | FaultKind::Voltage => beside("V", 1),

@@ -39,15 +39,18 @@
 //! | stop gesture | as an operator's stop |
 
 mod kind;
+mod recovery;
 mod state;
 mod supervisor;
 #[cfg(test)]
 mod tests;
+mod verdict;
 mod watch;
 mod words;
 
 pub use kind::{FaultKind, error_names};
 pub use state::{ServoState, Signs};
-pub use supervisor::{Cause, Change, Policy, Reaction, Request, Seen, Supervisor, Verdict};
+pub use supervisor::Supervisor;
+pub use verdict::{Cause, Change, Policy, Reaction, Request, Seen, Verdict};
 pub use watch::{Finding, Look, Watch};
 pub use words::{Crew, sentence};

@@ -1,116 +1,12 @@
 //! The supervisor: sees every cycle, says what follows. Pure, and without allocation once it is made.
 
 use super::kind::FaultKind;
+use super::recovery::AUTO_WAIT_S;
 use super::state::{ServoState, Signs};
+use super::verdict::{Cause, Change, Policy, Reaction, Seen, Verdict};
 use super::watch::Watch;
-use crate::base::JointState;
-use crate::bus::{CycleReport, ServoFacts, ServoHealth};
+use crate::bus::ServoFacts;
 use crate::config::file::{OnOverrun, OnServoFault, Rearm};
-use crate::config::safety::{StopGesture, Supervision};
-
-/// What the supervisor goes by.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Policy {
-    /// What is watched.
-    pub supervision: Supervision,
-    /// What a fault of a servo leads to.
-    pub on_servo_fault: OnServoFault,
-    /// Who takes servos back.
-    pub rearm: Rearm,
-    /// What late cycles lead to.
-    pub on_overrun: OnOverrun,
-    /// The gesture that stops a run.
-    pub stop_gesture: Option<StopGesture>,
-}
-
-/// What follows from a cycle, from the mildest to the gravest.
-#[derive(Copy, Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Reaction {
-    /// Go on.
-    #[default]
-    GoOn,
-    /// Stand still until told otherwise.
-    Hold,
-    /// The operator asked for the end by gesture: as by key.
-    OperatorStop,
-    /// Come to rest, into the end pose.
-    Ease,
-    /// Send nothing more.
-    AtOnce,
-}
-
-/// Something the bus is to do for a servo, outside the exchange.
-#[derive(Copy, Clone, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// Restart the servo of this joint, which clears its latched error.
-    Reboot(usize),
-    /// Torque on where it is.
-    Rearm(usize),
-}
-
-/// What the control loop is to do.
-#[derive(Copy, Clone, Debug, Default, PartialEq)]
-pub struct Verdict {
-    /// With the motion.
-    pub reaction: Reaction,
-    /// How much of it, 0..1; changes smoothly.
-    pub vigour: f64,
-    /// With the bus.
-    pub request: Option<Request>,
-}
-
-/// What ended a run, or would have.
-#[derive(Copy, Clone, Debug, PartialEq)]
-pub struct Cause {
-    /// What.
-    pub kind: FaultKind,
-    /// Of which joint; `None` for the robot as a whole.
-    pub joint: Option<usize>,
-    /// When, seconds since the start of the run.
-    pub t_s: f64,
-    /// What was measured.
-    pub value: f64,
-    /// Its limit.
-    pub limit: f64,
-}
-
-/// Something began or ended in this cycle.
-#[derive(Copy, Clone, Debug, PartialEq)]
-pub struct Change {
-    /// What.
-    pub kind: FaultKind,
-    /// Of which joint; `None` for the robot as a whole.
-    pub joint: Option<usize>,
-    /// It began (or its value was learnt) or it ended.
-    pub begins: bool,
-    /// What was measured.
-    pub value: f64,
-    /// Its limit.
-    pub limit: f64,
-}
-
-/// One cycle, as the supervisor is shown it.
-#[derive(Copy, Clone, Debug)]
-pub struct Seen<'a> {
-    /// Time since the start of the run, seconds.
-    pub t_s: f64,
-    /// What was sent, rad.
-    pub targets: &'a [f64],
-    /// What was read.
-    pub states: &'a [JointState],
-    /// What the bus saw.
-    pub report: &'a CycleReport,
-    /// How servos are; may be empty.
-    pub health: &'a [ServoHealth],
-    /// The cycle began a period or more after its deadline.
-    pub late: bool,
-    /// Joints whose pose was no number.
-    pub not_finite: usize,
-    /// An operator asks for a re-arm.
-    pub rearm: bool,
-    /// Amplitude of the stop gesture, 0 when there is none.
-    pub stop_gesture: f64,
-}
 
 /// How fast motion is made smaller and grows again, per second.
 const VIGOUR_RATE: [f64; 2] = [0.5, 0.1];
@@ -120,37 +16,31 @@ const LATE: [f64; 2] = [0.5, 0.1];
 const LATE_WINDOW_S: f64 = 1.0;
 /// Poses may be no numbers for this long, seconds.
 const NOT_FINITE_S: f64 = 0.1;
-/// By itself the supervisor grants this many re-arms to a servo,
-const AUTO_TRIES: u32 = 3;
-/// this long after it fell out, or after the last one, seconds.
-const AUTO_WAIT_S: f64 = 1.0;
-/// A granted re-arm that leads to nothing is forgotten after this long, seconds.
-const REARM_AT_MOST_S: f64 = 3.0;
 /// Requests to the bus are this far apart, seconds: each takes some milliseconds of a cycle.
 const REQUESTS_APART_S: f64 = 0.1;
 /// Between two cycles never more than this counts, seconds.
 const LONGEST_STEP_S: f64 = 0.05;
 
 #[derive(Clone, Debug)]
-struct Joint {
-    state: ServoState,
-    watch: Watch,
+pub(super) struct Joint {
+    pub state: ServoState,
+    pub watch: Watch,
     /// Faults at present, one bit per kind.
-    faults: u32,
-    left_out: bool,
+    pub faults: u32,
+    pub left_out: bool,
     /// Since when a re-arm is granted.
-    granted_s: Option<f64>,
-    rebooted: bool,
-    tries: u32,
-    auto_at_s: f64,
+    pub granted_s: Option<f64>,
+    pub rebooted: bool,
+    pub tries: u32,
+    pub auto_at_s: f64,
 }
 
-fn bit(kind: FaultKind) -> u32 {
+pub(super) fn bit(kind: FaultKind) -> u32 {
     1 << kind as u32
 }
 
 /// Faults that take a servo out of the motion.
-fn out_of_motion() -> u32 {
+pub(super) fn out_of_motion() -> u32 {
     bit(FaultKind::Alert)
         | bit(FaultKind::Torqueless)
         | bit(FaultKind::FollowingError)
@@ -160,9 +50,9 @@ fn out_of_motion() -> u32 {
 /// Sees every cycle of a run.
 #[derive(Clone, Debug)]
 pub struct Supervisor {
-    policy: Policy,
-    joints: Vec<Joint>,
-    changes: Vec<Change>,
+    pub(super) policy: Policy,
+    pub(super) joints: Vec<Joint>,
+    pub(super) changes: Vec<Change>,
     vigour: f64,
     /// Mean share of late cycles.
     late: f64,
@@ -172,7 +62,7 @@ pub struct Supervisor {
     gesture_s: f64,
     stopped: bool,
     last_s: f64,
-    request_at_s: f64,
+    pub(super) request_at_s: f64,
     cause: Option<Cause>,
 }
 
@@ -373,89 +263,6 @@ impl Supervisor {
         look.share
     }
 
-    /// Takes a servo back that fell out, step by step, once that is granted.
-    fn recover(&mut self, index: usize, seen: &Seen<'_>) -> Option<Request> {
-        let joint = &mut self.joints[index];
-        if !joint.left_out || self.policy.on_servo_fault == OnServoFault::Stop {
-            return None;
-        }
-        let by_itself = self.policy.rearm == Rearm::Auto
-            && joint.tries < AUTO_TRIES
-            && seen.t_s >= joint.auto_at_s;
-        match joint.granted_s {
-            None if seen.rearm || by_itself => {
-                joint.granted_s = Some(seen.t_s);
-                joint.tries = if seen.rearm { 0 } else { joint.tries + 1 };
-                joint.auto_at_s = seen.t_s + REARM_AT_MOST_S + AUTO_WAIT_S;
-            }
-            None => return None,
-            Some(since) if seen.t_s - since > REARM_AT_MOST_S => {
-                joint.granted_s = None;
-                joint.rebooted = false;
-                return None;
-            }
-            Some(_) => {}
-        }
-        if joint.rebooted || seen.t_s < self.request_at_s {
-            return None;
-        }
-        if joint.faults & bit(FaultKind::Alert) != 0 {
-            joint.rebooted = true;
-            return Some(Request::Reboot(index));
-        }
-        if joint.faults & bit(FaultKind::Torqueless) != 0 {
-            return Some(Request::Rearm(index));
-        }
-        // It has torque and stands where it was left: the cause was seen to.
-        self.took_back(index);
-        None
-    }
-
-    /// The bus did what [`Verdict::request`] asked; or it could not.
-    pub fn answered(&mut self, request: Request, done: bool) {
-        self.changes.clear();
-        match (request, done) {
-            (Request::Rearm(index), true) => self.took_back(index),
-            (Request::Reboot(_), true) => {}
-            (Request::Rearm(index) | Request::Reboot(index), false) => {
-                if let Some(joint) = self.joints.get_mut(index) {
-                    joint.granted_s = None;
-                    joint.rebooted = false;
-                }
-            }
-        }
-    }
-
-    fn took_back(&mut self, index: usize) {
-        if index >= self.joints.len() {
-            return;
-        }
-        for kind in FaultKind::ALL {
-            if bit(kind) & out_of_motion() != 0 {
-                self.set(Some(index), kind, false, 0.0, 0.0);
-            }
-        }
-        let joint = &mut self.joints[index];
-        joint.left_out = false;
-        joint.granted_s = None;
-        joint.watch.forget();
-        joint.state = joint.state.next(Signs {
-            answers: true,
-            torque: true,
-            rearmed: true,
-            ..Signs::default()
-        });
-        for begins in [true, false] {
-            self.changes.push(Change {
-                kind: FaultKind::Rearmed,
-                joint: Some(index),
-                begins,
-                value: 0.0,
-                limit: 0.0,
-            });
-        }
-    }
-
     fn judge_overruns(&mut self, seen: &Seen<'_>, dt_s: f64) {
         let late = if seen.late { 1.0 } else { 0.0 };
         self.late += (dt_s / LATE_WINDOW_S).min(1.0) * (late - self.late);
@@ -528,7 +335,14 @@ impl Supervisor {
     }
 
     /// Begins or ends a fault of a servo, or learns its value.
-    fn set(&mut self, at: Option<usize>, kind: FaultKind, active: bool, value: f64, limit: f64) {
+    pub(super) fn set(
+        &mut self,
+        at: Option<usize>,
+        kind: FaultKind,
+        active: bool,
+        value: f64,
+        limit: f64,
+    ) {
         let Some(joint) = at.and_then(|index| self.joints.get_mut(index)) else {
             return;
         };

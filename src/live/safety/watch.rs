@@ -9,6 +9,12 @@ use crate::config::safety::Supervision;
 const STANDING_RAD_S: f64 = 0.1;
 /// A servo that pushes and is nearer to its target than this has arrived: it carries a load, rad.
 const ARRIVED_RAD: f64 = 0.08;
+/// A servo that has not moved by more than this has not moved, rad,
+const MOVED_RAD: f64 = 0.02;
+/// though its target went to and fro by this.
+const SWEPT_RAD: f64 = 0.15;
+/// With this part of the effort of a stall it is blocked, with less it has lost its grip.
+const BLOCKED: f64 = 0.5;
 /// A target that has not moved for this long stands still, seconds.
 const STILL_S: f64 = 0.1;
 /// Times between two looks beyond this count as this much, seconds.
@@ -43,6 +49,38 @@ impl Backlash {
             self.value = self.value.clamp(measured, measured + self.play);
         }
         self.value
+    }
+}
+
+/// A servo that does not move while its target does.
+#[derive(Copy, Clone, Debug, Default)]
+struct Stuck {
+    /// Where it has been since it moved last, and where its target has been meanwhile: lowest, highest.
+    at: Option<(f64, f64, f64)>,
+    /// For how long the target's way has been enough to move it, seconds.
+    for_s: f64,
+    /// The most effort that it has given meanwhile, as a share.
+    effort: f64,
+}
+
+impl Stuck {
+    fn step(&mut self, target: f64, position: f64, effort: f64, dt_s: f64) {
+        match &mut self.at {
+            Some((at, low, high)) if (position - *at).abs() <= MOVED_RAD => {
+                *low = low.min(target);
+                *high = high.max(target);
+                self.effort = self.effort.max(effort);
+                if *high - *low > SWEPT_RAD {
+                    self.for_s += dt_s;
+                }
+            }
+            _ => {
+                *self = Self {
+                    at: Some((position, target, target)),
+                    ..Self::default()
+                };
+            }
+        }
     }
 }
 
@@ -86,6 +124,7 @@ pub struct Watch {
     still_s: f64,
     over_s: f64,
     stalled_s: f64,
+    stuck: Stuck,
     mean_square: f64,
     temperature: Backlash,
     strain: Backlash,
@@ -108,6 +147,7 @@ impl Watch {
             still_s: 0.0,
             over_s: 0.0,
             stalled_s: 0.0,
+            stuck: Stuck::default(),
             mean_square: 0.0,
             temperature: Backlash::new(BACKLASH * settings.temperature_margin_c),
             strain: Backlash::new(BACKLASH * (1.0 - STRAIN_BEGINS)),
@@ -135,6 +175,7 @@ impl Watch {
         self.lagged_rad = f64::NAN;
         self.over_s = 0.0;
         self.stalled_s = 0.0;
+        self.stuck = Stuck::default();
         self.seen_at = None;
     }
 
@@ -208,17 +249,20 @@ impl Watch {
                 (true, true) => self.stalled_s + dt_s,
                 (true, false) => self.stalled_s,
             };
+            self.stuck.step(target, state.position, effort, dt_s);
             let share = (dt_s / settings.effort_window_s.max(dt_s)).min(1.0);
             if effort.is_finite() {
                 self.mean_square += share * (effort * effort - self.mean_square);
             }
         }
-        let stalled = settings.stall_s > 0.0 && self.stalled_s >= settings.stall_s;
+        let watched = settings.stall_s > 0.0;
+        let stuck = watched && self.stuck.for_s >= settings.stall_s;
+        let blocked = self.stuck.effort >= BLOCKED * settings.stall_effort;
+        let stalled = watched && self.stalled_s >= settings.stall_s || stuck && blocked;
         // What pushes and stands is called by its name, though it is away from its target too.
-        let pushing = settings.stall_s > 0.0 && self.stalled_s > 0.0;
-        let off = settings.following_error_rad > 0.0
-            && self.over_s >= settings.following_error_s
-            && !pushing;
+        let pushing = watched && (self.stalled_s > 0.0 || self.stuck.for_s > 0.0 && blocked);
+        let off = settings.following_error_rad > 0.0 && self.over_s >= settings.following_error_s;
+        let off = (off || stuck) && !pushing;
         (
             Finding {
                 kind: FaultKind::FollowingError,
@@ -229,7 +273,7 @@ impl Watch {
             Finding {
                 kind: FaultKind::Stall,
                 active: stalled,
-                value: effort,
+                value: effort.max(self.stuck.effort),
                 limit: settings.stall_effort,
             },
         )
