@@ -209,7 +209,7 @@ impl DynamixelChain {
                         .zip(states.get_mut(index))
                     {
                         *state = self.servos[index].spec.state(registers, now);
-                        self.servos[index].last_pulse = Some(position_pulse(registers));
+                        self.servos[index].stands_at(position_pulse(registers));
                     }
                     self.servos[index].fresh = true;
                     report.fresh = report.fresh.saturating_add(1);
