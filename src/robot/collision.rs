@@ -7,13 +7,10 @@
 
 mod guard;
 mod shapes;
-#[cfg(test)]
-mod tests;
 
 use super::model::{JointKind, RobotModel};
 pub use guard::CollisionGuard;
 use nalgebra::{Isometry3, Point3};
-use parry3d_f64::query;
 use shapes::{Solid, pose};
 use std::path::Path;
 
@@ -320,9 +317,7 @@ impl CollisionModel {
         if apart - a.radius() - b.radius() >= limit_m {
             return f64::INFINITY;
         }
-        // All shapes here are convex and known to it, so it has an answer. None would count as a touch.
-        query::distance(&pose(first), a.shape(), &pose(second), b.shape())
-            .map_or(0.0, |found| found.distance)
+        a.distance(&pose(first), b, &pose(second))
     }
 }
 

@@ -5,6 +5,7 @@ use crate::robot::model::RobotModel;
 use crate::robot::tip;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use parry3d_f64::math::{Pose, Rotation, Vector};
+use parry3d_f64::query::{self, details};
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder, Shape};
 use std::f64::consts::FRAC_PI_2;
 use std::fmt;
@@ -20,12 +21,27 @@ pub(super) enum Solid {
 }
 
 impl Solid {
-    pub(super) fn shape(&self) -> &dyn Shape {
+    fn shape(&self) -> &dyn Shape {
         match self {
             Solid::Ball(ball) => ball,
             Solid::Cuboid(cuboid) => cuboid,
             Solid::Capsule(capsule) => capsule,
             Solid::Cylinder(cylinder) => cylinder,
+        }
+    }
+
+    /// Distance from this one at `here` to `other` at `there`; 0 when they overlap.
+    ///
+    /// By GJK. The crate's own way for two boxes is not taken: it begins at one corner, and where edges are nearly
+    /// parallel its answer is some millimetres too long.
+    pub(super) fn distance(&self, here: &Pose, other: &Solid, there: &Pose) -> f64 {
+        match (self, other) {
+            (Solid::Cuboid(a), Solid::Cuboid(b)) => {
+                details::distance_support_map_support_map(&here.inv_mul(there), a, b)
+            }
+            // The crate knows all of these, so it has an answer. None would count as a touch.
+            _ => query::distance(here, self.shape(), there, other.shape())
+                .map_or(0.0, |found| found.distance),
         }
     }
 
