@@ -3,9 +3,10 @@
 
 use handwave::base::Time;
 use handwave::base::{Clock, JointState, VirtualClock};
-use handwave::bus::ServoBus;
 use handwave::bus::dynamixel::model::Model;
 use handwave::bus::dynamixel::{ChainOptions, DynamixelChain, Master, MasterOptions, ServoSpec};
+use handwave::bus::parallel::BusPart;
+use handwave::bus::{ParallelBus, ServoBus};
 use handwave::bus::{Port, PortError};
 use handwave::sim::line::SharedLine;
 use handwave::sim::models::XL430_W250;
@@ -112,6 +113,41 @@ fn a_cycle_allocates_nothing() {
         let outcome = chain.exchange(&[0.1; 12], &mut states);
         COUNTING.set(false);
         outcome.expect("the bus is there");
+        assert_eq!(COUNT.get(), 0, "allocations up to cycle {cycle}");
+        clock.sleep_until(next);
+    }
+}
+
+#[test]
+fn a_cycle_over_two_buses_allocates_nothing() {
+    let clock: Arc<dyn Clock> = Arc::new(VirtualClock::new());
+    let model = Model::by_name("xl430-w250").expect("a known model");
+    let part = |name: &str| {
+        let line = Line::commissioned(&XL430_W250, 1..=6, 1_000_000, LineOptions::default());
+        let line = SharedLine::new(line.expect("a known rate"));
+        let branch = clock.branch().expect("virtual time");
+        let port = SimPort::new(line, Arc::new(branch.clone()), 1_000_000);
+        let master = Master::new(Box::new(Uncounted(port)), MasterOptions::default());
+        let specs = (1..=6).map(|id| ServoSpec::new(id, format!("{name}{id}"), model));
+        let chain = DynamixelChain::new(Box::new(master), specs.collect(), Default::default());
+        BusPart {
+            name: name.to_owned(),
+            bus: Box::new(chain.expect("sensible specs")),
+            branch: Some(branch),
+        }
+    };
+    let parts = vec![part("left"), part("right")];
+    let joints: Vec<String> = parts.iter().flat_map(|p| p.bus.joints().to_vec()).collect();
+    let mut bus = ParallelBus::new(joints, parts, Arc::clone(&clock), || {}).expect("two buses");
+    let mut states = [JointState::default(); 12];
+    bus.prepare(&mut states).expect("healthy chains");
+    bus.arm().expect("healthy chains");
+    for cycle in 0..200 {
+        let next = clock.now() + Duration::from_millis(5);
+        COUNTING.set(cycle >= 2);
+        let outcome = bus.exchange(&[0.1; 12], &mut states);
+        COUNTING.set(false);
+        assert_eq!(outcome.expect("the buses are there").fresh, 12);
         assert_eq!(COUNT.get(), 0, "allocations up to cycle {cycle}");
         clock.sleep_until(next);
     }

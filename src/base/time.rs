@@ -77,6 +77,11 @@ pub trait Clock: Send + Sync {
     fn now(&self) -> Time;
     /// Returns at `time` or later; at once when `time` has passed.
     fn sleep_until(&self, time: Time);
+    /// A clock of its own for one of several things that happen at the same time and are computed one
+    /// after the other: it begins where this one stands. `None` where time passes by itself.
+    fn branch(&self) -> Option<VirtualClock> {
+        None
+    }
 }
 
 /// A clock that stands still until somebody waits on it: sleeping moves it forward.
@@ -103,6 +108,11 @@ impl Clock for VirtualClock {
     }
     fn sleep_until(&self, time: Time) {
         self.advance_to(time);
+    }
+    fn branch(&self) -> Option<VirtualClock> {
+        let branch = VirtualClock::new();
+        branch.advance_to(self.now());
+        Some(branch)
     }
 }
 

@@ -33,6 +33,140 @@ pub enum DynamixelBackend {
     Dynamixel2,
 }
 
+/// One bus of a robot.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BusLine {
+    /// Its name in the configuration; `bus` where there is one.
+    pub name: String,
+    /// What it is.
+    pub address: BusAddress,
+    /// Baud rate of its simulated line.
+    pub sim_baud: u32,
+}
+
+/// The buses of a robot, in the order of its configuration; at least one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Buses {
+    lines: Vec<BusLine>,
+    of_joint: Vec<usize>,
+}
+
+impl Buses {
+    /// One bus for all.
+    pub fn one(address: BusAddress, sim_baud: u32) -> Self {
+        Self::several(
+            vec![BusLine {
+                name: "bus".into(),
+                address,
+                sim_baud,
+            }],
+            Vec::new(),
+        )
+    }
+
+    /// Several; `of_joint` says which of them carries each joint, those not listed hang on the first.
+    pub fn several(lines: Vec<BusLine>, of_joint: Vec<usize>) -> Self {
+        Buses { lines, of_joint }
+    }
+
+    /// Each of them.
+    pub fn lines(&self) -> &[BusLine] {
+        &self.lines
+    }
+
+    /// Which of them carries joint `joint`.
+    pub fn of_joint(&self, joint: usize) -> usize {
+        self.of_joint.get(joint).copied().unwrap_or(0)
+    }
+
+    /// Whether all of them are simulated.
+    pub fn is_simulated(&self) -> bool {
+        self.lines
+            .iter()
+            .all(|line| line.address == BusAddress::Sim)
+    }
+
+    /// Puts a simulated line in place of each bus; buses that share a port share the line of the first.
+    pub fn simulate(&mut self) {
+        let first = |address: &BusAddress| self.lines.iter().position(|l| l.address == *address);
+        let shared: Vec<usize> = self
+            .lines
+            .iter()
+            .enumerate()
+            .map(|(index, line)| match &line.address {
+                BusAddress::Sim => index,
+                port => first(port).unwrap_or(index),
+            })
+            .collect();
+        for bus in &mut self.of_joint {
+            *bus = shared.get(*bus).copied().unwrap_or(*bus);
+        }
+        for line in &mut self.lines {
+            line.address = BusAddress::Sim;
+        }
+    }
+
+    /// Puts `choice` in place of the bus that it names; without a name, of every bus of its kind. A simulated
+    /// line stands for any kind.
+    ///
+    /// # Errors
+    /// There is no bus of that name.
+    pub fn choose(&mut self, choice: &BusChoice) -> Result<(), AddressError> {
+        match &choice.name {
+            None => {
+                for line in &mut self.lines {
+                    line.address = choice.address.clone();
+                }
+            }
+            Some(name) => {
+                let names = || self.lines.iter().map(|line| line.name.clone()).collect();
+                let found = self.lines.iter().position(|line| line.name == *name);
+                let index = found.ok_or_else(|| AddressError::Name {
+                    found: name.clone(),
+                    allowed: names(),
+                })?;
+                self.lines[index].address = choice.address.clone();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether every bus is that one.
+impl PartialEq<BusAddress> for Buses {
+    fn eq(&self, address: &BusAddress) -> bool {
+        self.lines.iter().all(|line| line.address == *address)
+    }
+}
+
+/// `[NAME=]BUS` as written on the command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BusChoice {
+    /// Which bus of the configuration it is for; `None`: for all of its kind.
+    pub name: Option<String>,
+    /// The bus.
+    pub address: BusAddress,
+}
+
+impl FromStr for BusChoice {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        // A bus may have an option with an equals sign, behind its colon.
+        let named = text
+            .split_once('=')
+            .filter(|(name, _)| !name.is_empty() && !name.contains([':', ',', '/']));
+        let (name, address) = match named {
+            Some((name, address)) => (Some(name.to_owned()), address),
+            None => (None, text),
+        };
+        Ok(BusChoice {
+            name,
+            address: address.parse()?,
+        })
+    }
+}
+
 /// Why a text is not a bus.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
@@ -46,6 +180,14 @@ pub enum AddressError {
         found: String,
         /// The nearest known kind.
         suggestion: Option<&'static str>,
+    },
+    /// The configuration has no bus of that name.
+    #[error("there is no bus called '{found}'. Buses: {}", allowed.join(", "))]
+    Name {
+        /// What stood before the equals sign.
+        found: String,
+        /// Those of the configuration.
+        allowed: Vec<String>,
     },
     /// A kind of bus that is planned and not built in.
     #[error(
@@ -191,6 +333,35 @@ mod tests {
                 "{text} written and read again"
             );
         }
+    }
+
+    #[test]
+    fn a_bus_can_be_chosen_by_name_or_for_all() {
+        let legs = dynamixel("/dev/ttyUSB0", 1_000_000, Default::default());
+        let line = |name: &str| BusLine {
+            name: name.into(),
+            address: BusAddress::Sim,
+            sim_baud: 1_000_000,
+        };
+        let mut buses = Buses::several(vec![line("legs"), line("arms")], vec![1, 0]);
+        let choice = |text: &str| text.parse::<BusChoice>().expect(text);
+        assert!(buses.is_simulated());
+        buses
+            .choose(&choice("legs=dynamixel:/dev/ttyUSB0"))
+            .expect("there are legs");
+        assert_eq!(buses.lines()[0].address, legs);
+        assert_eq!(buses.lines()[1].address, BusAddress::Sim);
+        assert_eq!((buses.of_joint(0), buses.of_joint(5)), (1, 0));
+        let error = buses.choose(&choice("tail=sim")).expect_err("no tail");
+        assert_eq!(
+            error.to_string(),
+            "there is no bus called 'tail'. Buses: legs, arms"
+        );
+        buses.choose(&choice("sim")).expect("for all");
+        assert!(buses == BusAddress::Sim);
+        // An equals sign of an option is no name.
+        let option = choice("dynamixel:/tmp/p,backend=dynamixel2");
+        assert_eq!(option.name, None);
     }
 
     #[test]

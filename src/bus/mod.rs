@@ -3,16 +3,19 @@
 //! [`port`] is the seam to the wire (serial port, simulated line), [`dynamixel`] speaks the
 //! protocol over it, [`ServoBus`] is all that the live loop knows.
 
+mod adapter;
 pub mod address;
 pub mod dynamixel;
 mod no_servos;
+pub mod parallel;
 pub mod port;
 pub mod serial;
 pub mod tap;
 
 use crate::base::{JointState, Time};
-pub use address::{AddressError, BusAddress, DynamixelBackend};
+pub use address::{AddressError, BusAddress, BusChoice, BusLine, Buses, DynamixelBackend};
 pub use no_servos::NoServos;
+pub use parallel::ParallelBus;
 pub use port::{Port, PortError};
 pub use serial::SerialPort;
 
@@ -143,7 +146,8 @@ pub struct CycleReport {
     pub ramping_mask: u64,
     /// Damaged frames, wrong checksums and stray bytes seen.
     pub damaged: u16,
-    /// Bytes sent and received, for the wire budget.
+    /// Bytes sent and received, for the wire budget. Readings of [`ServoBus::health`], which take what is left of
+    /// a cycle, are not in it, nor in the times below.
     pub bytes: u32,
     /// Time from the first byte handed out to the last reply (or given up), in microseconds.
     pub cycle_us: u32,
@@ -194,6 +198,28 @@ pub enum BusError {
         problem: String,
         /// What to do.
         advice: String,
+    },
+    /// A lost bus was looked for and is not back.
+    #[error(
+        "bus {bus} is not back. Looked for {sought}: {found}. Plug it in again; nothing moves until it is armed anew"
+    )]
+    NotBack {
+        /// The bus as written on the command line.
+        bus: String,
+        /// What it is recognised by.
+        sought: String,
+        /// What is there instead, and why that is not it.
+        found: String,
+    },
+    /// One of several buses failed; the others can go on.
+    #[error("bus {name} (joints {}): {source}", joints.join(", "))]
+    OnBus {
+        /// Its name in the configuration.
+        name: String,
+        /// The joints on it.
+        joints: Vec<String>,
+        /// What happened there.
+        source: Box<BusError>,
     },
     /// No servo answered for so long that the bus counts as lost.
     #[error(

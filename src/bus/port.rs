@@ -64,6 +64,26 @@ pub trait Port: Send {
     fn latency_timer(&self) -> Option<Duration> {
         None
     }
+
+    /// Names under which this port may be found after it was lost, the likeliest first; none for a port
+    /// that cannot come back. A port around another one passes this and the three below on to it.
+    fn candidates(&self) -> Vec<String> {
+        Vec::new()
+    }
+    /// What a lost port is recognised by, for messages.
+    fn sought(&self) -> String {
+        self.name().to_owned()
+    }
+    /// Opens the port `name` in place of this one, which is closed before, at the same rate.
+    fn reopen(&mut self, name: &str) -> Result<(), PortError> {
+        Err(PortError::Open {
+            port: name.to_owned(),
+            reason: "this kind of port cannot be opened again".to_owned(),
+            advice: "Start again".to_owned(),
+        })
+    }
+    /// Lets go of the port until it is [reopened](Self::reopen), so that others can have it.
+    fn close(&mut self) {}
 }
 
 /// Puts something around each port as it is opened, such as a tap that records its bytes: takes the

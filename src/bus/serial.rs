@@ -1,14 +1,15 @@
 //! A real serial port (or pseudo-terminal) with deadlines finer than a millisecond.
 
+use super::adapter::{self, Identity};
 use super::address::BusAddress;
 use super::port::{Port, PortError};
 use crate::base::{Clock, Time};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::OFlags;
+use rustix::io::Errno;
 use serialport::{ClearBuffer, ErrorKind, SerialPort as _, TTYPort};
-use std::fs;
-use std::io::{self, Read, Write};
+use std::io;
 use std::os::fd::{AsRawFd, BorrowedFd};
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,11 +18,13 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// An open serial port.
 pub struct SerialPort {
-    tty: TTYPort,
+    /// `None` after it was closed and not found again.
+    tty: Option<TTYPort>,
     name: String,
     baud: u32,
     clock: Arc<dyn Clock>,
     latency_timer: Option<Duration>,
+    identity: Identity,
 }
 
 impl SerialPort {
@@ -29,21 +32,14 @@ impl SerialPort {
     ///
     /// `clock` is the time of the deadlines; it must run in real time.
     pub fn open(path: &str, baud: u32, clock: Arc<dyn Clock>) -> Result<Self, PortError> {
-        let tty = serialport::new(path, baud)
-            .timeout(WRITE_TIMEOUT)
-            .open_native()
-            .map_err(|error| open_error(path, baud, &error))?;
-        let mut port = SerialPort {
-            tty,
+        Ok(SerialPort {
+            tty: Some(open_tty(path, baud)?),
             name: path.into(),
             baud,
             clock,
-            latency_timer: lower_latency_timer(path),
-        };
-        // Direction control of some adapters hangs on RTS; pseudo-terminals have no such lines.
-        let _ = port.tty.write_request_to_send(false);
-        port.discard_input()?;
-        Ok(port)
+            latency_timer: adapter::lower_latency_timer(path),
+            identity: Identity::of(path),
+        })
     }
 
     /// How long a USB adapter keeps received bytes back before it sends them on, where it has such a timer.
@@ -60,24 +56,45 @@ impl SerialPort {
         }
     }
 
-    /// Waits for input until `deadline`; false when it passed. At least one look is taken.
-    fn wait_readable(&self, deadline: Time) -> Result<bool, PortError> {
-        // The descriptor is that of `self.tty`, which stays open at least as long as `self` is borrowed.
+    /// What the adapter's latency timer costs, if that is worth telling, with the commands that lower it.
+    pub fn latency_note(&self) -> Option<String> {
+        adapter::latency_note(&self.name, self.latency_timer)
+    }
+
+    fn tty(&mut self) -> Result<&mut TTYPort, PortError> {
+        self.tty.as_mut().ok_or_else(|| PortError::Gone {
+            port: self.name.clone(),
+            reason: "it was lost and has not been found again".into(),
+        })
+    }
+
+    /// The open descriptor.
+    fn descriptor(&mut self) -> Result<BorrowedFd<'_>, PortError> {
+        let raw = self.tty()?.as_raw_fd();
+        // It is that of `self.tty`, which stays open at least as long as `self` is borrowed.
         #[allow(unsafe_code)] // `TTYPort` gives its descriptor only as a number.
-        let fd = unsafe { BorrowedFd::borrow_raw(self.tty.as_raw_fd()) };
+        Ok(unsafe { BorrowedFd::borrow_raw(raw) })
+    }
+
+    /// Waits until `deadline` for the descriptor to be ready as `flags` say; false when it passed. At
+    /// least one look is taken.
+    fn wait(&mut self, flags: PollFlags, deadline: Time) -> Result<bool, PortError> {
         loop {
             let left = deadline.saturating_since(self.clock.now());
             let timeout = Timespec {
                 tv_sec: i64::try_from(left.as_secs()).unwrap_or(i64::MAX),
                 tv_nsec: left.subsec_nanos().into(),
             };
-            let mut fds = [PollFd::new(&fd, PollFlags::IN)];
-            match poll(&mut fds, Some(&timeout)) {
+            let fd = self.descriptor()?;
+            let mut fds = [PollFd::new(&fd, flags)];
+            let found = poll(&mut fds, Some(&timeout));
+            let ready = fds[0].revents().contains(flags);
+            match found {
                 Ok(0) => return Ok(false),
-                Ok(_) if fds[0].revents().contains(PollFlags::IN) => return Ok(true),
+                Ok(_) if ready => return Ok(true),
                 // Hang-up or error without anything left to read.
                 Ok(_) => return Err(self.gone("the other end hung up")),
-                Err(rustix::io::Errno::INTR) => {}
+                Err(Errno::INTR) => {}
                 Err(error) => return Err(self.gone(error)),
             }
         }
@@ -94,13 +111,12 @@ impl Port for SerialPort {
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), PortError> {
-        self.tty
-            .set_baud_rate(baud)
-            .map_err(|error| PortError::Baud {
-                port: self.name.clone(),
-                baud,
-                reason: error.to_string(),
-            })?;
+        let outcome = self.tty()?.set_baud_rate(baud);
+        outcome.map_err(|error| PortError::Baud {
+            port: self.name.clone(),
+            baud,
+            reason: error.to_string(),
+        })?;
         self.baud = baud;
         Ok(())
     }
@@ -109,20 +125,32 @@ impl Port for SerialPort {
         self.clock.now()
     }
 
-    fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.tty
-            .write_all(bytes)
-            .map_err(|error| self.gone(format!("writing failed ({error})")))
+    fn write_all(&mut self, mut bytes: &[u8]) -> Result<(), PortError> {
+        // One call, as a rule: the wait is for a full queue only.
+        while !bytes.is_empty() {
+            match rustix::io::write(self.descriptor()?, bytes) {
+                Ok(written) => bytes = &bytes[written.min(bytes.len())..],
+                Err(Errno::INTR) => {}
+                Err(Errno::AGAIN) => {
+                    let deadline = self.clock.now() + WRITE_TIMEOUT;
+                    if !self.wait(PollFlags::OUT, deadline)? {
+                        return Err(self.gone("its queue stays full"));
+                    }
+                }
+                Err(error) => return Err(self.gone(format!("writing failed ({error})"))),
+            }
+        }
+        Ok(())
     }
 
     fn read(&mut self, buf: &mut [u8], want: usize, deadline: Time) -> Result<usize, PortError> {
         let want = want.min(buf.len());
         let mut filled = 0;
-        while filled < want && self.wait_readable(deadline)? {
-            match self.tty.read(&mut buf[filled..]) {
+        while filled < want && self.wait(PollFlags::IN, deadline)? {
+            match rustix::io::read(self.descriptor()?, &mut buf[filled..]) {
                 Ok(0) => return Err(self.gone("end of file")),
                 Ok(count) => filled += count,
-                Err(error) if is_passing(&error) => {}
+                Err(Errno::INTR | Errno::AGAIN) => {}
                 Err(error) => return Err(self.gone(error)),
             }
         }
@@ -130,9 +158,29 @@ impl Port for SerialPort {
     }
 
     fn discard_input(&mut self) -> Result<(), PortError> {
-        self.tty
-            .clear(ClearBuffer::Input)
-            .map_err(|error| self.gone(error))
+        let outcome = self.tty()?.clear(ClearBuffer::Input);
+        outcome.map_err(|error| self.gone(error))
+    }
+
+    fn candidates(&self) -> Vec<String> {
+        self.identity.candidates()
+    }
+
+    fn sought(&self) -> String {
+        self.identity.sought()
+    }
+
+    fn reopen(&mut self, name: &str) -> Result<(), PortError> {
+        // First our own hold on it goes: it may be the same port.
+        self.tty = None;
+        self.tty = Some(open_tty(name, self.baud)?);
+        self.name = name.into();
+        self.latency_timer = adapter::lower_latency_timer(name);
+        Ok(())
+    }
+
+    fn close(&mut self) {
+        self.tty = None;
     }
 
     fn latency_timer(&self) -> Option<Duration> {
@@ -140,26 +188,24 @@ impl Port for SerialPort {
     }
 }
 
-/// Sets the latency timer of an FTDI-class adapter to 1 ms if allowed, and says what it is then.
-fn lower_latency_timer(path: &str) -> Option<Duration> {
-    // The device may be named by a link, such as one in /dev/serial/by-id.
-    let device = fs::canonicalize(path).ok()?;
-    let timer = Path::new("/sys/class/tty")
-        .join(device.file_name()?)
-        .join("device/latency_timer");
-    let read = || fs::read_to_string(&timer).ok()?.trim().parse().ok();
-    let millis: u64 = read()?;
-    if millis > 1 && fs::write(&timer, "1").is_ok() {
-        return read().map(Duration::from_millis);
-    }
-    Some(Duration::from_millis(millis))
-}
-
-fn is_passing(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
-    )
+/// Opens the terminal for this process alone and empties it.
+fn open_tty(path: &str, baud: u32) -> Result<TTYPort, PortError> {
+    let failed = |error| open_error(path, baud, &error);
+    let mut tty = serialport::new(path, baud)
+        .timeout(WRITE_TIMEOUT)
+        .open_native()
+        .map_err(failed)?;
+    // Direction control of some adapters hangs on RTS; pseudo-terminals have no such lines.
+    let _ = tty.write_request_to_send(false);
+    tty.clear(ClearBuffer::Input).map_err(failed)?;
+    // A full queue must not hold the control thread: it waits itself, with a deadline.
+    let raw = tty.as_raw_fd();
+    #[allow(unsafe_code)] // As in `descriptor`: `tty` outlives the borrow.
+    let fd = unsafe { BorrowedFd::borrow_raw(raw) };
+    rustix::fs::fcntl_getfl(fd)
+        .and_then(|flags| rustix::fs::fcntl_setfl(fd, flags | OFlags::NONBLOCK))
+        .map_err(|errno| failed(io::Error::from(errno).into()))?;
+    Ok(tty)
 }
 
 /// Says what stands in the way and what to do about it.
@@ -201,6 +247,7 @@ fn open_error(path: &str, baud: u32, error: &serialport::Error) -> PortError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::{Read, Write};
     use std::time::Instant;
 
     struct WallClock(Instant);

@@ -1,9 +1,13 @@
 //! `handwave bus`: look at and set up the servos of a bus.
 
+mod action;
 mod ask;
+mod backup;
 mod bench;
 mod calibrate;
+mod clear;
 mod crew;
+mod factory_reset;
 mod ids;
 mod jog;
 mod monitor;
@@ -15,7 +19,7 @@ mod setup;
 
 use super::{ExitStatus, Failure};
 use crate::base::Clock;
-use crate::bus::dynamixel::{self, Client, ClientError, Model};
+use crate::bus::dynamixel::{self, Backup, Client, ClientError, Model};
 use crate::bus::port::bare;
 use crate::bus::{AddressError, BusAddress};
 use crate::live::RealClock;
@@ -61,6 +65,13 @@ enum BusCommand {
     Read(registers::ReadArgs),
     Write(registers::WriteArgs),
     Reboot(RebootArgs),
+    Action(action::ActionArgs),
+    /// Let servos store their control table in themselves.
+    Backup(backup::BackupArgs),
+    /// Give servos the control table back that they stored; they restart.
+    Restore(backup::BackupArgs),
+    Clear(clear::ClearArgs),
+    FactoryReset(factory_reset::FactoryResetArgs),
     Bench(bench::BenchArgs),
 }
 
@@ -90,6 +101,11 @@ pub fn run(args: BusArgs) -> Result<ExitStatus, Failure> {
         BusCommand::Read(args) => registers::read(&args, &mut out),
         BusCommand::Write(args) => registers::write(&args, &mut out),
         BusCommand::Reboot(args) => reboot(&args, &mut out),
+        BusCommand::Action(args) => action::action(&args, &mut out),
+        BusCommand::Backup(args) => backup::backup(&args, Backup::Store, &mut out),
+        BusCommand::Restore(args) => backup::backup(&args, Backup::Restore, &mut out),
+        BusCommand::Clear(args) => clear::clear(&args, &mut out),
+        BusCommand::FactoryReset(args) => factory_reset::factory_reset(&args, &mut out),
         BusCommand::Bench(args) => bench::bench(&args, &mut out),
     }
 }

@@ -1,8 +1,8 @@
 //! What `run` keeps of a run: options, the recorder as an onlooker has it, and what the summary says of it.
 
 use super::Failure;
+use crate::bus::ServoBus;
 use crate::bus::port::Port;
-use crate::bus::{BusAddress, ServoBus};
 use crate::config::Character;
 use crate::gesture::PerformerScale;
 use crate::live::CycleRecord;
@@ -53,7 +53,7 @@ impl Keeping {
     /// What is to be kept: as the options say, else as the configuration does.
     pub fn plan(options: &KeepOptions, character: &Character, is_virtual: bool) -> Self {
         let wish = &character.record;
-        let real_servos = !is_virtual && matches!(character.bus, BusAddress::Dynamixel { .. });
+        let real_servos = !is_virtual && !character.bus.is_simulated();
         let forbidden =
             options.no_dump || std::env::var_os("HANDWAVE_NO_DUMP").is_some_and(|v| !v.is_empty());
         let dumps = wish.on_fault.unwrap_or(real_servos) && !forbidden;

@@ -69,9 +69,10 @@ pub struct RunOptions {
     /// the first still second
     #[arg(long, value_name = "NUMBER|rest")]
     scale: Option<PerformerScale>,
-    /// Bus in place of the configuration's: sim, dynamixel:PATH@BAUD
-    #[arg(long, value_name = "BUS")]
-    bus: Option<String>,
+    /// Bus in place of the configuration's: sim, dynamixel:PATH@BAUD; with NAME of the bus so called
+    /// (repeatable), without it of all
+    #[arg(long, value_name = "[NAME=]BUS")]
+    bus: Vec<String>,
     /// Control cycles per second
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
@@ -124,7 +125,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
     .map_err(Failure::input)?;
     if let (Some(avatar), true) = (
         &character.body.avatar,
-        options.bus.is_some() || !options.fault.is_empty(),
+        !options.bus.is_empty() || !options.fault.is_empty(),
     ) {
         return Err(Failure::input(format!(
             "--bus and --fault are for servos; {} is an avatar of {} joints and has none: leave them out",
@@ -132,9 +133,9 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
             avatar.skeleton.len()
         )));
     }
-    if let Some(bus) = &options.bus {
-        character.bus = bus
-            .parse()
+    for bus in &options.bus {
+        bus.parse()
+            .and_then(|choice| character.bus.choose(&choice))
             .map_err(|e| Failure::input(format!("--bus {bus}: {e}")))?;
     }
     if let Some(scale) = options.scale {

@@ -15,7 +15,7 @@ use super::record::{RecordOptions, record_options};
 use super::safety::Safety;
 use super::search::{SearchParts, search_parts};
 use super::servos::check_stopping;
-use crate::bus::BusAddress;
+use crate::bus::Buses;
 use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{
     EstimatorKind, FeatureSpec, FrontEnd, FrontEndOptions, GestureSet, PerformerScale,
@@ -63,10 +63,8 @@ pub struct Character {
     pub limits: Vec<JointEnvelope>,
     /// Class names with the gesture that drives each, in node order.
     pub classes: Vec<ClassParts>,
-    /// Bus as written.
-    pub bus: BusAddress,
-    /// Baud rate of the simulated line.
-    pub sim_baud: u32,
+    /// Its bus or buses, and which of them carries each joint.
+    pub bus: Buses,
     /// Control cycles per second.
     pub rate_hz: f64,
     /// Servo-side watchdog, ms; 0 is off.
@@ -213,7 +211,6 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         reload: file.input.reload,
         safety: Safety::of(safety),
         bus: wire.bus,
-        sim_baud: wire.baud,
         rate_hz: wire.rate_hz,
         watchdog_ms: wire.watchdog_ms,
         view_hz: file.view.refresh_hz,

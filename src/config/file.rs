@@ -6,7 +6,7 @@ mod robot;
 mod safety;
 
 pub use record::RecordEntry;
-pub use robot::{BusEntry, JointEntry, RobotEntry};
+pub use robot::{BusEntries, BusEntry, JointEntry, RobotEntry};
 pub use safety::{OnExit, OnLost, OnServoFault, SafetyEntry};
 
 use serde::Deserialize;
@@ -37,8 +37,8 @@ pub struct CharacterFile {
     pub graph: GraphEntry,
     /// The robot; it needs a bus.
     pub robot: Option<RobotEntry>,
-    /// The bus.
-    pub bus: Option<BusEntry>,
+    /// The bus, or several.
+    pub bus: Option<BusEntries>,
     /// Instead of robot and bus: an avatar.
     pub avatar: Option<AvatarEntry>,
     /// Ramps, safe states, what to do when something is lost.

@@ -7,6 +7,7 @@ mod avatar;
 mod blending;
 pub mod body;
 pub mod build;
+mod buses;
 mod channel;
 mod class;
 pub mod edit;

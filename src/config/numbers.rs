@@ -7,7 +7,9 @@ use super::file::CharacterFile;
 pub(super) fn check_numbers(file: &CharacterFile, at: &Pointer<'_>) -> Result<(), ConfigError> {
     let s = &file.safety;
     let g = &file.graph;
-    let (robot, bus, avatar) = (file.robot.as_ref(), file.bus.as_ref(), file.avatar.as_ref());
+    let (robot, avatar) = (file.robot.as_ref(), file.avatar.as_ref());
+    // Those of further buses are checked with their names.
+    let bus = file.bus.as_ref().and_then(|buses| buses.0.first());
     let checks = [
         ("input.window", file.input.window, 0.1, 2.0),
         (

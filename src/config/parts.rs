@@ -2,13 +2,14 @@
 
 use super::avatar::{Avatar, coordinate_names};
 use super::body::Body;
+use super::buses::bus_lines;
 use super::error::{ConfigError, Pointer};
 use super::file::{AvatarEntry, CharacterFile, RobotEntry};
 use super::files::Files;
 use super::motion::read;
 use super::servos::servo_map;
-use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
+use crate::bus::{BusAddress, Buses};
 use crate::robot::{JointEnvelope, RobotModel};
 
 /// What is driven, and what carries the targets to it.
@@ -23,8 +24,7 @@ pub(super) struct Parts {
 
 /// How targets are carried.
 pub(super) struct WireParts {
-    pub(super) bus: BusAddress,
-    pub(super) baud: u32,
+    pub(super) bus: Buses,
     pub(super) rate_hz: f64,
     pub(super) watchdog_ms: u32,
 }
@@ -35,8 +35,8 @@ pub(super) fn parts(
     file: &CharacterFile,
     at: &Pointer<'_>,
 ) -> Result<Parts, ConfigError> {
-    let (robot, bus) = match (&file.robot, &file.bus, &file.avatar) {
-        (Some(robot), Some(bus), None) => (robot, bus),
+    let (robot, buses) = match (&file.robot, &file.bus, &file.avatar) {
+        (Some(robot), Some(buses), None) => (robot, buses),
         (None, None, Some(avatar)) => return avatar_parts(files, avatar, at),
         (Some(_), _, Some(avatar)) => {
             let problem =
@@ -59,17 +59,22 @@ pub(super) fn parts(
     };
     let model = RobotModel::from_urdf(&read(files, &robot.urdf, "robot.urdf", at)?)
         .map_err(|e| at.at(robot.urdf.span(), "robot.urdf", e))?;
+    let lines = bus_lines(buses, at)?;
+    let (servos, of_joint) = servo_map(robot, &buses.0, &model, at)?.into_iter().unzip();
+    let (rate_hz, watchdog_ms) = buses
+        .0
+        .first()
+        .map_or((0.0, 0), |bus| (bus.rate_hz, bus.watchdog_ms));
     Ok(Parts {
         body: Body::new(&model, robot, at)?,
         joints: model.joint_names(),
         limits: envelope_limits(robot, &model),
-        servos: servo_map(robot, bus, &model, at)?,
+        servos,
         model: Some(model),
         wire: WireParts {
-            bus: bus.bus.parse().map_err(|e| at.key("bus.bus", e))?,
-            baud: bus.baud,
-            rate_hz: bus.rate_hz,
-            watchdog_ms: bus.watchdog_ms,
+            bus: Buses::several(lines, of_joint),
+            rate_hz,
+            watchdog_ms,
         },
     })
 }
@@ -96,8 +101,7 @@ fn avatar_parts(
         body,
         servos: Vec::new(),
         wire: WireParts {
-            bus: BusAddress::Sim,
-            baud: 0,
+            bus: Buses::one(BusAddress::Sim, 0),
             rate_hz: entry.rate_hz,
             watchdog_ms: 0,
         },

@@ -1,5 +1,6 @@
 //! The joint map: which servo moves which joint, checked against the URDF's limits.
 
+use super::buses::bus_of;
 use super::error::{ConfigError, Pointer};
 use super::file::{BusEntry, JointEntry, OnExit, RobotEntry};
 use crate::base::suggest::hint;
@@ -9,16 +10,19 @@ use crate::bus::dynamixel::{
 };
 use crate::robot::RobotModel;
 
-/// Servos in model order; every moving joint has exactly one.
+/// Servos in model order with the bus that each hangs on; every moving joint has exactly one.
 pub(super) fn servo_map(
     robot: &RobotEntry,
-    bus: &BusEntry,
+    buses: &[BusEntry],
     model: &RobotModel,
     at: &Pointer<'_>,
-) -> Result<Vec<ServoSpec>, ConfigError> {
+) -> Result<Vec<(ServoSpec, usize)>, ConfigError> {
     let joints = model.joint_names();
     let of_all = |problem| at.key("bus.model", problem);
-    let servo_model = model_named(bus.model.get_ref(), of_all)?;
+    let servo_models = buses
+        .iter()
+        .map(|bus| model_named(bus.model.get_ref(), of_all));
+    let servo_models = servo_models.collect::<Result<Vec<_>, _>>()?;
     let mut by_joint: Vec<Option<&JointEntry>> = vec![None; joints.len()];
     for entry in &robot.joint {
         let name = entry.name.get_ref();
@@ -37,7 +41,7 @@ pub(super) fn servo_map(
         if let Some(other) = by_joint
             .iter()
             .flatten()
-            .find(|o| o.servo.get_ref() == entry.servo.get_ref())
+            .find(|o| o.servo.get_ref() == entry.servo.get_ref() && o.bus() == entry.bus())
         {
             return Err(at.at(
                 entry.servo.span(),
@@ -68,7 +72,10 @@ pub(super) fn servo_map(
                     format!("joint {joint} has no servo; add {{ name = \"{joint}\", servo = ID }}"),
                 )
             })?;
-            servo_spec(entry, joint, servo_model, (limit.lower, limit.upper), at)
+            let bus = bus_of(entry, buses, at)?;
+            let limits = (limit.lower, limit.upper);
+            let spec = servo_spec(entry, joint, servo_models[bus], limits, at)?;
+            Ok((spec, bus))
         })
         .collect()
 }

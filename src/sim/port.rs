@@ -14,6 +14,8 @@ pub struct SimPort {
     line: SharedLine,
     clock: Arc<dyn Clock>,
     baud: u32,
+    /// Let go of, and not opened again since.
+    closed: bool,
 }
 
 impl SimPort {
@@ -23,12 +25,13 @@ impl SimPort {
             line,
             clock,
             baud: baud_bps,
+            closed: false,
         }
     }
 
     fn check(&self, now: Time) -> Result<(), PortError> {
         let mut line = self.line.lock();
-        if !line.is_unplugged(now) {
+        if !self.closed && !line.is_unplugged(now) {
             return Ok(());
         }
         line.advance(now);
@@ -101,5 +104,19 @@ impl Port for SimPort {
         let mut waste = [0; 64];
         while line.receive(now, &mut waste) > 0 {}
         Ok(())
+    }
+
+    fn candidates(&self) -> Vec<String> {
+        vec![self.name().to_owned()]
+    }
+
+    /// It comes back under its own name, once it is plugged in again.
+    fn reopen(&mut self, _: &str) -> Result<(), PortError> {
+        self.closed = false;
+        self.check(self.clock.now())
+    }
+
+    fn close(&mut self) {
+        self.closed = true;
     }
 }

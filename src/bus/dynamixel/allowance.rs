@@ -8,7 +8,11 @@ use std::time::Duration;
 pub struct Allowance {
     now: Duration,
     min: Duration,
+    /// The one to begin with, and the most that mere silence leads to.
+    first: Duration,
     max: Duration,
+    /// How late answers are as a rule.
+    typical: Duration,
     /// Answers in a row of which nothing came in time.
     misses: u32,
     /// The last answer was given up: what comes before the next request is late.
@@ -16,15 +20,23 @@ pub struct Allowance {
 }
 
 impl Allowance {
-    /// Begins at `max`.
-    pub fn new(min: Duration, max: Duration) -> Self {
+    /// Begins at `first`.
+    pub fn new(min: Duration, first: Duration, max: Duration) -> Self {
+        let max = max.max(first);
         Allowance {
-            now: max,
+            now: first,
             min: min.min(max),
+            first,
             max,
+            typical: Duration::ZERO,
             misses: 0,
             gave_up: false,
         }
+    }
+
+    /// As at first: another adapter may be another one.
+    pub fn begin_anew(&mut self) {
+        *self = Self::new(self.min, self.first, self.max);
     }
 
     pub fn get(&self) -> Duration {
@@ -35,10 +47,20 @@ impl Allowance {
         self.max
     }
 
+    /// How late answers are as a rule: one turn of adapter and system.
+    pub fn typical(&self) -> Duration {
+        self.typical
+    }
+
+    fn wish(&self, lateness: Duration) -> Duration {
+        (lateness * 2 + Duration::from_micros(100)).clamp(self.min, self.max)
+    }
+
     /// Learns from a complete answer that came `lateness` after its computed time.
     pub fn arrived(&mut self, lateness: Duration) {
         self.misses = 0;
-        let wish = (lateness * 2 + Duration::from_micros(100)).clamp(self.min, self.max);
+        self.typical = (self.typical * 7 + lateness.min(self.max)) / 8;
+        let wish = self.wish(lateness);
         // Up at once, down slowly: one quick answer says little about the next.
         self.now = match self.now.checked_sub(wish) {
             Some(excess) => self.now - excess / 64,
@@ -65,8 +87,14 @@ impl Allowance {
         mem::take(&mut self.gave_up)
     }
 
-    /// An answer was late rather than lost.
+    /// An answer that was given up came in the end, or nothing comes at all. Not beyond the first allowance:
+    /// one servo that is always late must not hold up the cycle.
     pub fn lengthen(&mut self) {
-        self.now = (self.now * 3 / 2).min(self.max);
+        self.now = self.now.max((self.now * 3 / 2).min(self.first));
+    }
+
+    /// An answer that was given up came `lateness` after its computed time, and was waited for.
+    pub fn came_late(&mut self, lateness: Duration) {
+        self.now = self.now.max(self.wish(lateness));
     }
 }

@@ -1,14 +1,15 @@
 //! The `dynamixel2` crate as a second [`Client`], for comparison with our own.
 //!
-//! Its limits: no fast reads (an ordinary sync read stands in), 34 ms of patience added to every
+//! Its limits: no fast reads (an ordinary sync read stands in), no bulk and no backup of tables, 34 ms of patience added to every
 //! wait, so one silent servo stalls a control cycle; a servo that is silent in a sync read spoils
 //! the answers of those behind it; builds with overflow checks panic on some damaged frames.
 
 use super::client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
 use crate::base::{Clock, Time};
 use crate::bus::port::PortError;
-use dynamixel2::instructions::SyncWriteData;
+use dynamixel2::instructions::{FactoryResetKind, SyncWriteData};
 use dynamixel2::{Bus, ReadError, Response, TransferError, WriteError};
+use handwave_dynamixel::instruction::FactoryReset;
 use handwave_dynamixel::{BROADCAST_ID, ErrorCode, wire};
 use serial2::SerialPort;
 use std::io;
@@ -136,6 +137,10 @@ impl Client for Dynamixel2Client {
         self.traffic
     }
 
+    fn backend(&self) -> &'static str {
+        "dynamixel2"
+    }
+
     /// Without effect: 34 ms are more than any return delay.
     fn set_return_delay(&mut self, _: Duration) {}
 
@@ -192,10 +197,7 @@ impl Client for Dynamixel2Client {
 
     fn write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError> {
         if id == BROADCAST_ID {
-            return Err(ClientError::Unsupported {
-                backend: "dynamixel2",
-                what: "write to all servos at once",
-            });
+            return Err(self.unsupported("write to all servos at once"));
         }
         self.count(wire::write(data.len()), wire::status(0));
         let outcome = self.bus.write(id, address, data);
@@ -205,6 +207,41 @@ impl Client for Dynamixel2Client {
     fn reboot(&mut self, id: u8) -> Result<Reply, ClientError> {
         self.count(wire::BARE_INSTRUCTION, wire::status(0));
         let outcome = self.bus.reboot(id);
+        Ok(self.reply(id, outcome)?.0)
+    }
+
+    fn reg_write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError> {
+        self.count(wire::write(data.len()), wire::status(0));
+        let outcome = self.bus.reg_write(id, address, data);
+        Ok(self.reply(id, outcome)?.0)
+    }
+
+    fn action(&mut self, id: u8) -> Result<Reply, ClientError> {
+        if id == BROADCAST_ID {
+            self.count(wire::BARE_INSTRUCTION, 0);
+            let sent = self.bus.broadcast_action();
+            sent.map_err(|error| self.write_error(&error))?;
+            return Ok(Reply::default());
+        }
+        self.count(wire::BARE_INSTRUCTION, wire::status(0));
+        let outcome = self.bus.action(id);
+        Ok(self.reply(id, outcome)?.0)
+    }
+
+    fn clear_multi_turn(&mut self, id: u8) -> Result<Reply, ClientError> {
+        self.count(wire::BARE_INSTRUCTION + 5, wire::status(0));
+        let outcome = self.bus.clear_revolution_counter(id);
+        Ok(self.reply(id, outcome)?.0)
+    }
+
+    fn factory_reset(&mut self, id: u8, what: FactoryReset) -> Result<Reply, ClientError> {
+        self.count(wire::BARE_INSTRUCTION + 1, wire::status(0));
+        let kind = match what {
+            FactoryReset::All => FactoryResetKind::ResetAll,
+            FactoryReset::KeepId => FactoryResetKind::KeepId,
+            FactoryReset::KeepIdAndBaud => FactoryResetKind::KeepIdAndBaudRate,
+        };
+        let outcome = self.bus.factory_reset(id, kind);
         Ok(self.reply(id, outcome)?.0)
     }
 

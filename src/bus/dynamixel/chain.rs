@@ -1,15 +1,17 @@
 //! A chain of Dynamixel servos as a [`ServoBus`]: joint angles in, joint states out.
 //!
 //! The parts: `check` looks at everything before torque goes on, `cycle` is the control cycle,
-//! `recovery` brings servos back that were silent.
+//! `recovery` brings servos back that were silent, `health` looks at one servo in some cycles, `absence` finds
+//! out about servos that are not there at the start, `reopen` finds a lost port again.
 
 use super::client::{Client, ClientError, Outcome};
 use super::follow::Follower;
 use super::groups::{ReadGroup, goal_registers, read_groups};
+use super::health::Watch;
 use super::model::{STATE_BYTES, address};
 use super::servo::{ServoSpec, SpecError};
 use crate::base::{JointState, Time};
-use crate::bus::{BusError, CycleReport, ServoBus, ServoFacts, TorqueReport};
+use crate::bus::{BusError, CycleReport, ServoBus, ServoFacts, ServoHealth, TorqueReport};
 use std::time::Duration;
 
 /// How often a request that brought no answer is repeated outside the control cycle, at least.
@@ -18,7 +20,11 @@ const TRIES: u32 = 3;
 /// servo that is still booting is worth waiting for.
 const START_PATIENCE: Duration = Duration::from_millis(250);
 /// After an answer that did not come in time, the line is listened to until it was quiet this long.
-const QUIET: Duration = Duration::from_millis(10);
+///
+/// Longer than the latency timer of a USB adapter as it comes from the shop: its answers are then seen to be late.
+const QUIET: Duration = Duration::from_millis(20);
+/// Answers that come this late are worth a word: twice the latency timer that is wanted, and some.
+const WORTH_A_WORD: Duration = Duration::from_millis(4);
 
 /// Settings of a chain.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,6 +128,7 @@ pub struct DynamixelChain {
     /// How long a request that brings no answer is repeated at present.
     patience: Duration,
     pub(super) scratch: Scratch,
+    pub(super) watch: Watch,
     /// Servos that are read together.
     pub(super) groups: Vec<ReadGroup>,
     /// Goal registers in use: address and bytes.
@@ -155,6 +162,7 @@ impl DynamixelChain {
         let goal_registers = goal_registers(&specs);
         let (groups, members) = read_groups(&specs);
         Ok(DynamixelChain {
+            watch: Watch::new(specs.iter().map(|spec| spec.model), now),
             joints: specs.iter().map(|spec| spec.joint.clone()).collect(),
             servos: specs
                 .into_iter()
@@ -205,6 +213,20 @@ impl DynamixelChain {
     /// The client below, for its counters.
     pub fn client(&self) -> &dyn Client {
         &*self.client
+    }
+
+    /// Tells of time that is lost on the way to the servos, in every cycle.
+    fn note_time(&mut self) {
+        self.notes.extend_from_slice(self.client.notes());
+        let lateness = self.client.lateness();
+        if self.client.notes().is_empty() && lateness > WORTH_A_WORD {
+            self.notes.push(format!(
+                "answers come {:.1} ms later than the wire needs, which leaves about {:.0} cycles a second. It is \
+                 the adapter's latency timer as a rule: set it to 1 ms, or use a port without one",
+                1e3 * lateness.as_secs_f64(),
+                (1.0 / (lateness + Duration::from_millis(2)).as_secs_f64()).floor()
+            ));
+        }
     }
 
     /// Says what a failed request means for servo `index`.
@@ -304,7 +326,10 @@ impl ServoBus for DynamixelChain {
         self.patience = START_PATIENCE;
         let checked = self.check_all(states);
         self.patience = Duration::ZERO;
-        checked
+        checked.map_err(|error| self.explain_absence(error))?;
+        self.read_all_health()?;
+        self.note_time();
+        Ok(())
     }
 
     /// Makes the present position the goal of every servo, then turns torque on, reads it back and
@@ -431,6 +456,14 @@ impl ServoBus for DynamixelChain {
 
     fn facts(&self) -> &[ServoFacts] {
         &self.facts
+    }
+
+    fn health(&self) -> &[ServoHealth] {
+        &self.watch.values
+    }
+
+    fn reopen(&mut self) -> Result<(), BusError> {
+        self.find_port_again()
     }
 
     fn notes(&self) -> &[String] {

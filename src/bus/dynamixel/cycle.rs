@@ -70,6 +70,7 @@ impl DynamixelChain {
         report.bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
         report.damaged = u16::try_from(after.damaged - before.damaged).unwrap_or(u16::MAX);
         report.cycle_us = micros(now.saturating_since(begin));
+        self.look_after_health(begin, report.alert_mask)?;
 
         let silence = now.saturating_since(self.last_heard);
         if report.fresh == 0 && silence >= self.options.lost_after && !self.servos.is_empty() {

@@ -6,12 +6,11 @@
 //! a silent servo or too short for a USB adapter.
 
 use super::allowance::Allowance;
-use super::client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
+use super::client::{ClientError, Reply};
 use crate::base::Time;
 use crate::bus::port::Port;
-use handwave_dynamixel::lists::encode_sync_write;
 use handwave_dynamixel::{
-    BROADCAST_ID, BufferTooSmall, ErrorCode, FrameParser, Instruction, MAX_ID, Status, wire,
+    BROADCAST_ID, BufferTooSmall, ErrorCode, FrameParser, Instruction, Status, wire,
 };
 use std::time::Duration;
 
@@ -19,8 +18,6 @@ use std::time::Duration;
 const FRAME_BYTES: usize = 2048;
 /// Longest combined status: 253 servos with 12 bytes each.
 pub(super) const FAST_BYTES: usize = 4096;
-/// What a host has to wait per possible id after a broadcast ping, beside the answers' wire time.
-const PING_SLOT: Duration = Duration::from_millis(3);
 
 /// What a [`Master`] allows for.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -30,8 +27,11 @@ pub struct MasterOptions {
     pub return_delay: Duration,
     /// Least allowance for adapter and system. Default 600 us.
     pub min_allowance: Duration,
-    /// Most allowance, and the one to begin with. Default 4 ms: a USB adapter with a latency timer
-    /// of 1 ms, or a busy system.
+    /// Allowance to begin with, and the most that silence alone leads to. Default 4 ms: a USB adapter with a
+    /// latency timer of 1 ms, or a busy system.
+    pub first_allowance: Duration,
+    /// Most allowance, for answers that were seen to come late. Default 40 ms: twice the latency timer of a
+    /// USB adapter as it comes from the shop, and some.
     pub max_allowance: Duration,
 }
 
@@ -40,7 +40,8 @@ impl Default for MasterOptions {
         MasterOptions {
             return_delay: wire::return_delay(254),
             min_allowance: Duration::from_micros(600),
-            max_allowance: Duration::from_millis(4),
+            first_allowance: Duration::from_millis(4),
+            max_allowance: Duration::from_millis(40),
         }
     }
 }
@@ -49,7 +50,7 @@ impl MasterOptions {
     /// The default, with patience for an adapter that keeps bytes back.
     pub fn of(port: &dyn Port) -> Self {
         let mut options = Self::default();
-        options.max_allowance += port.latency_timer().unwrap_or_default();
+        options.first_allowance += port.latency_timer().unwrap_or_default();
         options
     }
 }
@@ -63,13 +64,19 @@ pub struct Master {
     pub(super) return_delay: Duration,
     pub(super) allowance: Allowance,
     /// When the last byte handed to the port leaves it.
-    line_free_at: Time,
-    cycle_end: Option<Time>,
+    pub(super) line_free_at: Time,
+    /// When the answer that was given up last was due.
+    pub(super) missed_due: Option<Time>,
+    /// What comes in before the next request is no answer to it and is thrown away: false right behind a
+    /// request that nobody answers.
+    pub(super) may_hold_stale: bool,
+    pub(super) notes: Vec<String>,
+    pub(super) cycle_end: Option<Time>,
     pub(super) parser: FrameParser<FRAME_BYTES>,
     /// Bytes of a combined status.
     pub(super) combined: Box<[u8; FAST_BYTES]>,
     out: Box<[u8; FRAME_BYTES]>,
-    sent: u64,
+    pub(super) sent: u64,
     pub(super) received: u64,
     /// Damage that the parser does not see.
     pub(super) damaged: u64,
@@ -81,8 +88,15 @@ impl Master {
         Master {
             port,
             return_delay: options.return_delay,
-            allowance: Allowance::new(options.min_allowance, options.max_allowance),
+            allowance: Allowance::new(
+                options.min_allowance,
+                options.first_allowance,
+                options.max_allowance,
+            ),
             line_free_at: Time::ZERO,
+            missed_due: None,
+            may_hold_stale: true,
+            notes: Vec::new(),
             cycle_end: None,
             parser: FrameParser::new(),
             combined: Box::new([0; FAST_BYTES]),
@@ -93,8 +107,13 @@ impl Master {
         }
     }
 
+    /// With something to tell of its port.
+    pub fn with_notes(self, notes: Vec<String>) -> Self {
+        Master { notes, ..self }
+    }
+
     /// Time of `bytes` on the line.
-    fn wire_time(&self, bytes: usize) -> Duration {
+    pub(super) fn wire_time(&self, bytes: usize) -> Duration {
         wire::duration(bytes, self.port.baud())
     }
 
@@ -120,7 +139,9 @@ impl Master {
                 self.allowance.lengthen();
             }
         }
-        self.port.discard_input()?;
+        if std::mem::replace(&mut self.may_hold_stale, true) {
+            self.port.discard_input()?;
+        }
         let begin = self.port.now().max(self.line_free_at);
         self.line_free_at = begin + wire::duration(frame.len(), self.port.baud());
         self.sent += frame.len() as u64;
@@ -133,10 +154,9 @@ impl Master {
         self.line_free_at + self.return_delay * delays + self.wire_time(bytes)
     }
 
-    /// Until when the next part of an answer due at `due` is waited for, when `behind` servos would be
-    /// asked again if it does not come and answer with `answer_bytes` in all.
-    pub(super) fn deadline(&self, due: Time, behind: usize, answer_bytes: usize) -> Time {
-        let again = wire::sync_read(behind) + answer_bytes;
+    /// Until when the next part of an answer due at `due` is waited for, when asking the servos behind it
+    /// again would take `again` bytes, there and back.
+    pub(super) fn deadline(&self, due: Time, again: usize) -> Time {
         let spare = self
             .cycle_end
             .map(|end| end - self.wire_time(again) - SPARE_MARGIN);
@@ -144,8 +164,15 @@ impl Master {
         spare.map_or(patient, |spare| patient.max(spare))
     }
 
+    /// Gives an answer up that was due at `due`; `nothing` of it came.
+    pub(super) fn missed(&mut self, due: Time, nothing: bool) {
+        self.missed_due = Some(due);
+        self.allowance.missed(nothing);
+    }
+
     /// Learns from an answer that was complete just now and due at `due`.
     pub(super) fn arrived(&mut self, due: Time) {
+        self.missed_due = None;
         let lateness = self.port.now().saturating_since(due);
         self.allowance.arrived(lateness);
     }
@@ -185,12 +212,36 @@ impl Master {
         }
     }
 
+    /// Sends an instruction that is answered without data; to the broadcast id nobody answers.
+    pub(super) fn command(
+        &mut self,
+        id: u8,
+        instruction: &Instruction<'_>,
+    ) -> Result<Reply, ClientError> {
+        self.send(|buf| instruction.encode(id, buf))?;
+        if id == BROADCAST_ID {
+            return Ok(Reply::default());
+        }
+        self.answer(id, &mut [])
+    }
+
     /// Waits for the answer of `id` to the request just sent.
-    fn answer(&mut self, id: u8, data: &mut [u8]) -> Result<Reply, ClientError> {
+    pub(super) fn answer(&mut self, id: u8, data: &mut [u8]) -> Result<Reply, ClientError> {
+        self.answer_by(id, data, None)
+    }
+
+    /// Waits for the answer of `id`, until `latest` at most.
+    pub(super) fn answer_by(
+        &mut self,
+        id: u8,
+        data: &mut [u8],
+        latest: Option<Time>,
+    ) -> Result<Reply, ClientError> {
         let bytes = wire::status(data.len());
         let asked_at = self.port.now();
         let due = self.due(1, bytes);
-        let deadline = due + self.allowance.get();
+        let patient = due + self.allowance.get();
+        let deadline = latest.map_or(patient, |latest| patient.min(latest));
         let mut result = None;
         let expected = data.len();
         let answered = self.receive(bytes, deadline, |status| {
@@ -219,7 +270,7 @@ impl Master {
         if answered {
             self.arrived(due);
         } else {
-            self.allowance.missed(true);
+            self.missed(due, true);
         }
         result.unwrap_or_else(|| {
             let waited = self.port.now().saturating_since(asked_at);
@@ -239,154 +290,4 @@ pub(super) enum Accepted {
     More,
     /// Nobody asked for it.
     Stranger,
-}
-
-fn ping_reply(id: u8, alert: bool, params: &[u8]) -> Option<Ping> {
-    match *params {
-        [low, high, firmware] => Some(Ping {
-            id,
-            model: u16::from_le_bytes([low, high]),
-            firmware,
-            alert,
-        }),
-        _ => None,
-    }
-}
-
-impl Client for Master {
-    fn port_name(&self) -> &str {
-        self.port.name()
-    }
-
-    fn baud(&self) -> u32 {
-        self.port.baud()
-    }
-
-    fn set_baud(&mut self, baud: u32) -> Result<(), ClientError> {
-        Ok(self.port.set_baud(baud)?)
-    }
-
-    fn now(&self) -> Time {
-        self.port.now()
-    }
-
-    fn traffic(&self) -> Traffic {
-        let parser = self.parser.damage();
-        Traffic {
-            sent: self.sent,
-            received: self.received,
-            damaged: self.damaged + u64::from(parser.stray_bytes) + u64::from(parser.bad_crc),
-        }
-    }
-
-    fn set_return_delay(&mut self, delay: Duration) {
-        self.return_delay = delay;
-    }
-
-    fn patience(&self) -> Duration {
-        self.return_delay + self.allowance.get()
-    }
-
-    fn set_cycle_end(&mut self, end: Option<Time>) {
-        self.cycle_end = end;
-    }
-
-    fn settle(&mut self, quiet: Duration) -> Result<(), ClientError> {
-        let end = self.port.now() + quiet * 10;
-        let mut late = [0; 256];
-        loop {
-            let deadline = end.min(self.port.now() + quiet);
-            let count = self.port.read(&mut late, 1, deadline)?;
-            self.damaged += count as u64;
-            if count == 0 || self.port.now() >= end {
-                return Ok(());
-            }
-        }
-    }
-
-    fn ping(&mut self, id: u8) -> Result<Ping, ClientError> {
-        self.send(|buf| Instruction::Ping.encode(id, buf))?;
-        let mut params = [0; 3];
-        let reply = self.answer(id, &mut params)?;
-        Ok(Ping {
-            id,
-            model: u16::from_le_bytes([params[0], params[1]]),
-            firmware: params[2],
-            alert: reply.alert,
-        })
-    }
-
-    fn ping_all(&mut self, found: &mut dyn FnMut(Ping)) -> Result<(), ClientError> {
-        self.send(|buf| Instruction::Ping.encode(BROADCAST_ID, buf))?;
-        let ids = u32::from(MAX_ID) + 1;
-        let deadline = self.line_free_at
-            + (PING_SLOT + self.wire_time(wire::PING_STATUS)) * ids
-            + self.allowance.max();
-        self.receive(wire::PING_STATUS, deadline, |status| {
-            match ping_reply(status.id, status.alert, status.params) {
-                Some(ping) => {
-                    found(ping);
-                    Accepted::More
-                }
-                None => Accepted::Stranger,
-            }
-        })?;
-        Ok(())
-    }
-
-    fn read(&mut self, id: u8, address: u16, data: &mut [u8]) -> Result<Reply, ClientError> {
-        let length = u16::try_from(data.len()).unwrap_or(u16::MAX);
-        self.send(|buf| Instruction::Read { address, length }.encode(id, buf))?;
-        self.answer(id, data)
-    }
-
-    fn write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError> {
-        self.send(|buf| Instruction::Write { address, data }.encode(id, buf))?;
-        if id == BROADCAST_ID {
-            return Ok(Reply::default());
-        }
-        self.answer(id, &mut [])
-    }
-
-    fn reboot(&mut self, id: u8) -> Result<Reply, ClientError> {
-        self.send(|buf| Instruction::Reboot.encode(id, buf))?;
-        if id == BROADCAST_ID {
-            return Ok(Reply::default());
-        }
-        self.answer(id, &mut [])
-    }
-
-    fn sync_write(
-        &mut self,
-        address: u16,
-        length: u16,
-        ids: &[u8],
-        data: &[u8],
-    ) -> Result<(), ClientError> {
-        let size = usize::from(length).max(1);
-        let items = ids.iter().copied().zip(data.chunks(size));
-        self.send(|buf| encode_sync_write(buf, address, length, items))
-    }
-
-    fn sync_read(
-        &mut self,
-        address: u16,
-        length: u16,
-        ids: &[u8],
-        data: &mut [u8],
-        outcomes: &mut [Outcome],
-    ) -> Result<(), ClientError> {
-        self.read_in_turn(address, length, ids, data, outcomes)
-    }
-
-    fn fast_sync_read(
-        &mut self,
-        address: u16,
-        length: u16,
-        ids: &[u8],
-        data: &mut [u8],
-        outcomes: &mut [Outcome],
-    ) -> Result<(), ClientError> {
-        self.read_combined(address, length, ids, data, outcomes)
-    }
 }

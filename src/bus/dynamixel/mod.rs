@@ -5,6 +5,7 @@
 //! `dynamixel2` crate as a second implementation (feature `dxl-serial2`); [`model`] says
 //! what the registers mean; [`DynamixelChain`] is the [`ServoBus`](super::ServoBus) in joint angles.
 
+mod absence;
 mod allowance;
 #[cfg(feature = "dxl-serial2")]
 pub mod backend_dynamixel2;
@@ -17,9 +18,12 @@ mod follow;
 mod goals;
 mod group_read;
 mod groups;
+mod health;
 pub mod master;
 pub mod model;
 mod recovery;
+mod reopen;
+mod requests;
 #[cfg(test)]
 mod scripted;
 pub mod servo;
@@ -33,6 +37,7 @@ pub mod vitals;
 pub use backend_dynamixel2::Dynamixel2Client;
 pub use chain::{ChainOptions, DynamixelChain};
 pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
+pub use handwave_dynamixel::instruction::{Backup, BulkReadEntry, BulkWriteEntry, FactoryReset};
 pub use master::{Master, MasterOptions};
 pub use model::{Mode, Model, Protocol, Register};
 pub use servo::{Direction, ServoSpec, SpecError};
@@ -59,9 +64,10 @@ pub fn open(
     match backend {
         DynamixelBackend::Handwave => {
             let port = SerialPort::open(path, baud, clock)?;
+            let notes = port.latency_note().into_iter().collect();
             let port = wrap(&format!("dynamixel:{path}@{baud}"), Box::new(port));
             let options = MasterOptions::of(port.as_ref());
-            Ok(Box::new(Master::new(port, options)))
+            Ok(Box::new(Master::new(port, options).with_notes(notes)))
         }
         #[cfg(feature = "dxl-serial2")]
         DynamixelBackend::Dynamixel2 => Ok(Box::new(Dynamixel2Client::open(path, baud, clock)?)),

@@ -86,4 +86,24 @@ impl Port for TapPort {
         }
         self.noted(outcome)
     }
+
+    fn candidates(&self) -> Vec<String> {
+        self.port.candidates()
+    }
+
+    fn sought(&self) -> String {
+        self.port.sought()
+    }
+
+    /// A success alone is logged: a try that fails has no bytes.
+    fn reopen(&mut self, name: &str) -> Result<(), PortError> {
+        self.port.reopen(name)?;
+        let latency = self.port.latency_timer().unwrap_or_default();
+        self.note(Event::Open(name.as_bytes(), self.port.baud(), latency));
+        Ok(())
+    }
+
+    fn close(&mut self) {
+        self.port.close();
+    }
 }

@@ -190,6 +190,9 @@ impl Script {
     }
 }
 
+/// Ports that may be tried in one search for a lost one.
+const REOPENINGS: usize = 32;
+
 /// Answers as a port did, and compares what is sent.
 #[derive(Debug)]
 pub struct ReplayPort {
@@ -327,5 +330,24 @@ impl Port for ReplayPort {
             || "discarding input".into(),
             |event| (*event == Event::Discard).then_some(()),
         )
+    }
+
+    /// The log tells which of the tries succeeded, one after the other.
+    fn candidates(&self) -> Vec<String> {
+        vec![self.name.clone(); REOPENINGS]
+    }
+
+    fn reopen(&mut self, _: &str) -> Result<(), PortError> {
+        let mut script = self.script.lock().unwrap_or_else(PoisonError::into_inner);
+        let opened = script.offer(|event| match event {
+            Event::Open(name, baud, latency) => {
+                Some((String::from_utf8_lossy(name).into_owned(), *baud, *latency))
+            }
+            _ => None,
+        });
+        drop(script);
+        let (name, baud, latency) = opened.ok_or_else(|| self.gone())?;
+        (self.name, self.baud, self.latency) = (name, baud, latency);
+        Ok(())
     }
 }

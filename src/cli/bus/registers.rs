@@ -38,7 +38,8 @@ pub struct ReadArgs {
 Examples:
   handwave bus write dynamixel:/dev/ttyUSB0 1-12 return_delay_time 0
   handwave bus write dynamixel:/dev/ttyUSB0 3 torque_enable 0
-  handwave bus write dynamixel:/dev/ttyUSB0 3 65:1 1")]
+  handwave bus write dynamixel:/dev/ttyUSB0 3 65:1 1
+  handwave bus write dynamixel:/dev/ttyUSB0 3 goal_position 2100 --later    then `bus action`")]
 pub struct WriteArgs {
     /// The bus, such as dynamixel:/dev/ttyUSB0@1000000.
     #[arg(value_name = "BUS")]
@@ -52,6 +53,9 @@ pub struct WriteArgs {
     /// Whole number, also as 0x10.
     #[arg(value_name = "VALUE", allow_hyphen_values = true, value_parser = parse_value)]
     value: i64,
+    /// The servo holds the write until `handwave bus action`.
+    #[arg(long)]
+    later: bool,
 }
 
 pub fn read(args: &ReadArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure> {
@@ -108,6 +112,17 @@ pub fn write(args: &WriteArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
             hold_position(&mut *client, id, layout)?;
         }
         let bytes = register.encode(args.value);
+        if args.later {
+            client.reg_write(id, register.address, &bytes[..usize::from(register.size)])?;
+            say(
+                out,
+                format_args!(
+                    "servo {id}: {} = {} held until the action",
+                    register.name, args.value
+                ),
+            )?;
+            continue;
+        }
         client.write(id, register.address, &bytes[..usize::from(register.size)])?;
         if matches!(register.name, "id" | "baud_rate") {
             // From now on it answers elsewhere.

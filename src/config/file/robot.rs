@@ -1,8 +1,11 @@
 //! `[robot]` and `[bus]` as a user writes them: joints, their servos, the line that carries them.
 
 use super::{control_rate, one, yes};
-use serde::Deserialize;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
+use std::fmt;
 use toml::Spanned;
 
 /// The robot.
@@ -34,6 +37,8 @@ pub struct JointEntry {
     pub name: Spanned<String>,
     /// Servo id on the bus.
     pub servo: Spanned<u8>,
+    /// Name of the bus that it hangs on; needed where there are several.
+    pub bus: Option<Spanned<String>>,
     /// Servo model; that of `bus.model` when not given.
     pub model: Option<Spanned<String>>,
     /// Operating mode: `position`, `extended_position`, `current_based_position`, `velocity` or `current`, as the model has them.
@@ -95,10 +100,48 @@ pub struct HostGainsEntry {
     pub d: f64,
 }
 
-/// The bus.
+impl JointEntry {
+    /// Name of its bus, if it is given.
+    pub fn bus(&self) -> Option<&str> {
+        self.bus.as_ref().map(|bus| bus.get_ref().as_str())
+    }
+}
+
+/// `[bus]`, or `[[bus]]` several times, each with a name.
+#[derive(Debug)]
+pub struct BusEntries(pub Vec<BusEntry>);
+
+impl<'de> Deserialize<'de> for BusEntries {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(OneOrMany)
+    }
+}
+
+struct OneOrMany;
+
+impl<'de> Visitor<'de> for OneOrMany {
+    type Value = BusEntries;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a table [bus], or several [[bus]]")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<BusEntries, A::Error> {
+        let entry = BusEntry::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(BusEntries(vec![entry]))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<BusEntries, A::Error> {
+        Vec::deserialize(SeqAccessDeserializer::new(seq)).map(BusEntries)
+    }
+}
+
+/// A bus.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BusEntry {
+    /// Its name, for `bus = NAME` of joints and `--bus NAME=BUS`; needed where there are several.
+    pub name: Option<Spanned<String>>,
     /// `sim` or a bus such as `dynamixel:/dev/ttyUSB0@1000000`.
     pub bus: String,
     /// Baud rate of the simulated line.

@@ -3,8 +3,8 @@
 use super::avatar::TapBus;
 use super::pose;
 use crate::base::{Clock, Time};
+use crate::bus::Port;
 use crate::bus::tap::{Difference, Event, ReplayPort, Script, Verdict};
-use crate::bus::{BusAddress, Port};
 use crate::config::Character;
 use crate::live::control::{self, ControlOptions, Parts};
 use crate::live::feed::Feed;
@@ -195,7 +195,7 @@ pub fn replay(
         seen: Mutex::default(),
     });
     // The simulated line is only a stand-in that `wrap` replaces: nothing real is opened.
-    character.bus = BusAddress::Sim;
+    character.bus.simulate();
     let clock: Arc<dyn Clock> = Arc::clone(&control) as Arc<dyn Clock>;
     let mut wanted = 0;
     let mut wrap = |_: &str, port: Box<dyn Port>| -> Box<dyn Port> {
