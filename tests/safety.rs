@@ -142,6 +142,7 @@ fn after_a_pause_of_the_machine_no_goal_jumps() {
             reload: None,
             stop: StopSwitch::new(),
             options: session::control_options(&character, RATE_HZ, Some(18.0)),
+            taps: None,
             on_start: Box::new(|_| {}),
         };
         let mut pause = Pause {

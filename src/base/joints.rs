@@ -9,7 +9,7 @@ pub struct JointState {
     pub position: f64,
     /// Velocity in rad/s (m/s).
     pub velocity: f64,
-    /// Effort as the servo reports it: fraction of maximum load, -1..1, or newton metres where known.
+    /// Effort as the servo reports it, and in its unit: share of the greatest load, -1..1, or current in ampere.
     pub effort: f64,
     /// When the values were measured; `None` while nothing was ever read.
     pub measured_at: Option<Time>,

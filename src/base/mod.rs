@@ -2,6 +2,8 @@
 
 pub mod angle;
 pub mod joints;
+#[cfg(feature = "record")]
+pub mod mcap;
 pub mod print;
 pub mod random;
 pub mod suggest;

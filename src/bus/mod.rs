@@ -8,6 +8,7 @@ pub mod dynamixel;
 mod no_servos;
 pub mod port;
 pub mod serial;
+pub mod tap;
 
 use crate::base::{JointState, Time};
 pub use address::{AddressError, BusAddress, DynamixelBackend};

@@ -1,6 +1,7 @@
 //! The seam to the wire: a half-duplex byte port with deadlines.
 
 use crate::base::Time;
+use std::time::Duration;
 
 /// Why a port failed. Any of these means that the bus is lost until the port is opened again.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +60,10 @@ pub trait Port: Send {
     fn read(&mut self, buf: &mut [u8], want: usize, deadline: Time) -> Result<usize, PortError>;
     /// Throws away what was received and not yet read.
     fn discard_input(&mut self) -> Result<(), PortError>;
+    /// How long an adapter keeps received bytes back before it sends them on, where it has such a timer.
+    fn latency_timer(&self) -> Option<Duration> {
+        None
+    }
 }
 
 /// Puts something around each port as it is opened, such as a tap that records its bytes: takes the

@@ -134,6 +134,10 @@ impl Port for SerialPort {
             .clear(ClearBuffer::Input)
             .map_err(|error| self.gone(error))
     }
+
+    fn latency_timer(&self) -> Option<Duration> {
+        self.latency_timer
+    }
 }
 
 /// Sets the latency timer of an FTDI-class adapter to 1 ms if allowed, and says what it is then.

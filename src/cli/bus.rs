@@ -1,6 +1,7 @@
 //! `handwave bus`: look at and set up the servos of a bus.
 
 mod ask;
+mod bench;
 mod calibrate;
 mod crew;
 mod ids;
@@ -13,8 +14,8 @@ mod scan;
 mod setup;
 
 use super::{ExitStatus, Failure};
-use crate::bus::dynamixel::{self, Client, ClientError, Model};
 use crate::base::Clock;
+use crate::bus::dynamixel::{self, Client, ClientError, Model};
 use crate::bus::port::bare;
 use crate::bus::{AddressError, BusAddress};
 use crate::live::RealClock;
@@ -40,7 +41,8 @@ Examples:
   handwave bus read dynamixel:/dev/ttyUSB0 1-12 present_position
   handwave bus read dynamixel:/dev/ttyUSB0 3 all
   handwave bus write dynamixel:/dev/ttyUSB0@57600 1 baud_rate 3
-  handwave bus reboot dynamixel:/dev/ttyUSB0 3")]
+  handwave bus reboot dynamixel:/dev/ttyUSB0 3
+  handwave bus bench dynamixel:/dev/ttyUSB0 --seconds 5")]
 pub struct BusArgs {
     #[command(subcommand)]
     command: BusCommand,
@@ -59,6 +61,7 @@ enum BusCommand {
     Read(registers::ReadArgs),
     Write(registers::WriteArgs),
     Reboot(RebootArgs),
+    Bench(bench::BenchArgs),
 }
 
 /// Restart servos: clears a latched hardware error; torque is off afterwards.
@@ -87,6 +90,7 @@ pub fn run(args: BusArgs) -> Result<ExitStatus, Failure> {
         BusCommand::Read(args) => registers::read(&args, &mut out),
         BusCommand::Write(args) => registers::write(&args, &mut out),
         BusCommand::Reboot(args) => reboot(&args, &mut out),
+        BusCommand::Bench(args) => bench::bench(&args, &mut out),
     }
 }
 
@@ -115,8 +119,7 @@ fn open_on(bus: &BusAddress, clock: Arc<dyn Clock>) -> Result<Box<dyn Client>, F
             path,
             baud,
             backend,
-        } => dynamixel::open(path, *baud, *backend, clock, &mut bare)
-            .map_err(Failure::bus),
+        } => dynamixel::open(path, *baud, *backend, clock, &mut bare).map_err(Failure::bus),
     }
 }
 

@@ -8,9 +8,16 @@ mod failure;
 pub mod gesture;
 pub mod graph;
 mod graph_build;
+#[cfg(feature = "record")]
+mod keeping;
+#[cfg(not(feature = "record"))]
+#[path = "keeping_off.rs"]
+mod keeping;
 mod legged;
 pub mod map;
 pub mod poses;
+#[cfg(feature = "record")]
+pub mod replay;
 pub mod run;
 pub mod sim;
 mod summary;
@@ -48,6 +55,9 @@ enum Command {
     Character(character::CharacterArgs),
     /// Pose mapping: the performer's pose itself drives a body; suggest, learn, apply, study
     Map(map::MapArgs),
+    /// A recorded run once more: does it send the same bytes?
+    #[cfg(feature = "record")]
+    Replay(replay::ReplayArgs),
     /// The motion graph: build classes, show it, check it, compare ways to find transitions
     Graph(graph::GraphArgs),
     /// Look at and set up servos on a bus
@@ -67,6 +77,8 @@ pub fn main() -> ExitCode {
         Some(Command::Clip(args)) => clip::run(&args),
         Some(Command::Character(args)) => character::run(&args),
         Some(Command::Map(args)) => map::run(args),
+        #[cfg(feature = "record")]
+        Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Graph(args)) => graph::run(&args),
         Some(Command::Bus(args)) => bus::run(args),
         Some(Command::Sim(args)) => sim::run(args),

@@ -1,11 +1,11 @@
 //! `handwave run`: the main job. Poses in, servos move.
 
+use super::keeping::{self, HowRun, KeepOptions, Keeping, Kept};
 use super::summary;
 use super::targets::TargetsFile;
 use super::{ExitStatus, Failure, say, warn};
 use crate::base::{Clock, VirtualClock};
 use crate::bus::BusAddress;
-use crate::bus::port::bare;
 use crate::config::files::BUILT_IN;
 use crate::config::{self, Character, Files, GestureFiles};
 use crate::gesture::PerformerScale;
@@ -97,6 +97,8 @@ pub struct RunOptions {
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    keep: KeepOptions,
 }
 
 /// Where time comes from.
@@ -113,10 +115,10 @@ pub enum Speed {
 pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
     let RunArgs { config, options } = args;
     let mut character = match config {
-        None => config::load(Files::Embedded, BUILT_IN),
+        None => config::load(Files::Embedded.keeping(), BUILT_IN),
         Some(path) => {
             let (files, name) = Files::of(path);
-            config::load(files, &name)
+            config::load(files.keeping(), &name)
         }
     }
     .map_err(Failure::input)?;
@@ -196,12 +198,22 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
         newest: CycleRecord::default(),
         footing: character.body.feet.clone().map(Footing::new),
         later: Vec::new(),
+        keeping: Keeping::plan(&options.keep, &character, options.speed == Speed::Max),
     };
     let report = match options.speed {
         Speed::Max => {
             let clock = VirtualClock::new();
             let shared: Arc<dyn Clock> = Arc::new(clock.clone());
-            let session = session(options, &character, rate_hz, source, faults, shared, stop)?;
+            let session = session(
+                options,
+                &character,
+                rate_hz,
+                source,
+                faults,
+                shared,
+                stop,
+                &mut onlooker.keeping,
+            )?;
             session::run_virtual(session, &clock, &mut onlooker)
         }
         Speed::Real => {
@@ -217,6 +229,7 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
                 faults,
                 Arc::clone(&clock),
                 stop,
+                &mut onlooker.keeping,
             )?;
             let ran = session::run_real(session, clock, &mut onlooker, character.view_hz);
             onlooker.display = Display::Quiet;
@@ -228,7 +241,17 @@ pub fn run(args: &RunArgs) -> Result<ExitStatus, Failure> {
     }
     let written = onlooker.targets.map_or(Ok(()), TargetsFile::finish);
     let slides = onlooker.footing.map(|f| f.slides());
-    conclude(options, report, slides, written, &character)
+    let kept = onlooker.keeping.finish(bad_end(&report.ending));
+    conclude(options, report, slides, written, &kept, &character)
+}
+
+/// Why a run ended that ended badly.
+fn bad_end(ending: &Ending) -> Option<String> {
+    match ending {
+        Ending::Complete | Ending::Interrupted => None,
+        Ending::SafetyStop(why) => Some(format!("safety stop: {why}")),
+        Ending::Bus(error) => Some(format!("bus failure: {error}")),
+    }
 }
 
 fn faults(options: &RunOptions, character: &Character) -> Result<Vec<FaultSpec>, Failure> {
@@ -277,6 +300,7 @@ fn reload(
 }
 
 /// Opens the bus and puts the session together.
+#[expect(clippy::too_many_arguments, reason = "each is a part of a session")]
 fn session(
     options: &RunOptions,
     character: &Character,
@@ -285,26 +309,44 @@ fn session(
     faults: Vec<FaultSpec>,
     clock: Arc<dyn Clock>,
     stop: StopSwitch,
+    keeping: &mut Keeping,
 ) -> Result<Session<Box<dyn BufRead + Send>>, Failure> {
     let reload = reload(options, character, source.live.is_some())?;
     let first = source.first_sample()?;
     let puppet =
         session::puppet(character, source.reader.header(), rate_hz).map_err(Failure::input)?;
-    let wire =
-        wire::open(character, &character.bus, clock, rate_hz, &mut bare).map_err(|e| match e {
-            WireError::Port(_) => Failure::bus(e),
-            other => Failure::input(other),
-        })?;
+    let now_ns = clock.now().nanos();
+    let wire = wire::open(
+        character,
+        &character.bus,
+        clock,
+        rate_hz,
+        &mut |name, port| keeping.wrap(name, port),
+    )
+    .map_err(|e| match e {
+        WireError::Port(_) => Failure::bus(e),
+        other => Failure::input(other),
+    })?;
+    let bus = keeping.wrap_bus(character, wire.bus)?;
+    let how = HowRun {
+        rate_hz,
+        duration_s: options.duration,
+        faults: &options.fault,
+        is_virtual: options.speed == Speed::Max,
+        now_ns,
+    };
+    keeping.begin(character, source.reader.header(), &how)?;
     let line = wire.line;
     Ok(Session {
         puppet,
-        bus: wire.bus,
+        bus,
         reader: source.reader,
         first,
         live: source.live,
         reload,
         stop,
         options: session::control_options(character, rate_hz, options.duration),
+        taps: keeping.taps(),
         on_start: Box::new(move |start| {
             if let Some(line) = &line {
                 wire::inject(line, &faults, start);
@@ -319,18 +361,16 @@ fn conclude(
     report: Report,
     slides: Option<Slides>,
     written: Result<(), String>,
+    kept: &Kept,
     character: &Character,
 ) -> Result<ExitStatus, Failure> {
     if options.json {
-        say(format_args!(
-            "{}",
-            summary::to_json(&report, slides, character)
-        ));
+        let mut summary = summary::to_json(&report, slides, character);
+        summary["recording"] = keeping::to_json(kept);
+        say(format_args!("{summary}"));
     } else {
-        say(format_args!(
-            "{}",
-            summary::to_text(&report, slides, character).trim_end()
-        ));
+        let summary = summary::to_text(&report, slides, character) + &keeping::lines(kept);
+        say(format_args!("{}", summary.trim_end()));
     }
     let end = |status, message: String| Failure { status, message };
     // The gravest first: what became of the robot outranks what was wrong with a file.
@@ -364,6 +404,9 @@ fn conclude(
         return Err(Failure::input(error));
     }
     written.map_err(Failure::input)?;
+    if let Some(problem) = kept.problems.first() {
+        return Err(Failure::input(problem));
+    }
     Ok(if interrupted {
         ExitStatus::Interrupted
     } else {
@@ -379,6 +422,8 @@ struct Onlooker {
     footing: Option<Footing>,
     /// What could not be said while the view had the terminal.
     later: Vec<String>,
+    /// What is kept of the run.
+    keeping: Keeping,
 }
 
 impl Observer for Onlooker {
@@ -389,6 +434,7 @@ impl Observer for Onlooker {
         if let Some(footing) = &mut self.footing {
             footing.see(record);
         }
+        self.keeping.see(record);
         self.newest.clone_from(record);
         self.display.count(record);
     }
@@ -400,6 +446,7 @@ impl Observer for Onlooker {
     fn news(&mut self, news: &News) {
         if let News::Gestures(names) = news {
             self.display.rename_gestures(names);
+            self.keeping.rename_gestures(names);
         }
         if self.display.shares_the_terminal() {
             warn(format_args!("{news}"));

@@ -38,6 +38,8 @@ Prints 'ready PATH' when clients may connect, serves them one after another, and
 
 Servos start as commissioned: return delay 0, status return level 2, position mode, torque off, position 2048.
 A servo set to another baud rate than the client's port is silent. A reboot takes a quarter of a second.
+FIRMWARE is a version, as in xl330-m288@47: fast reads need 45 (46 on the 330 size; MX and PH42 have none), a bus watchdog 38,
+and the indirect data of the 330 size lies at 224 before 52, at 208 from then on.
 Behind a servo that stays silent in a sync or bulk read, the others answer when its time is over; a fast read ends there.
 
 Standard input is the hand at the servos: 'plug N' and 'unplug N', and 'turn N DEGREES' turns a shaft whose torque is off
@@ -45,14 +47,14 @@ Standard input is the hand at the servos: 'plug N' and 'unplug N', and 'turn N D
 
 Examples:
   handwave sim dynamixel --servos 1-12 --link /tmp/servos
-  handwave sim dynamixel --servos 1-6,20:xl430-w250 --link /tmp/servos --baud 3000000
+  handwave sim dynamixel --servos 1-6:xl330-m288@47,20:xm430-w350 --link /tmp/servos --baud 3000000
   handwave sim dynamixel --servos 1-4 --link /tmp/servos --fault 3:silent@2s..2.5s --fault bus:corrupt=0.01@0s --seed 7
   handwave sim dynamixel --servos 1-3 --link /tmp/servos --factory     then type: plug 1
 ";
 
 #[derive(Args, Debug)]
 struct DynamixelArgs {
-    /// Servo ids and their model: 1-12[:MODEL][,20:MODEL...]; MODEL defaults to xl430-w250
+    /// Servo ids and their model: 1-12[:MODEL[@FIRMWARE]][,20:MODEL...]; MODEL defaults to xl430-w250
     #[arg(long, required_unless_present = "list_faults")]
     servos: Option<String>,
     /// Where to link the pseudo-terminal; an old link is replaced
@@ -124,10 +126,7 @@ fn dynamixel(args: &DynamixelArgs) -> Result<ExitStatus, Failure> {
     Ok(ExitStatus::Done)
 }
 
-fn build_line(
-    args: &DynamixelArgs,
-    servos: &[(u8, &'static Device)],
-) -> Result<(Line, u32), String> {
+fn build_line(args: &DynamixelArgs, servos: &[Asked]) -> Result<(Line, u32), String> {
     if !(0.0..=1000.0).contains(&args.latency_ms) {
         return Err(format!(
             "--latency-ms takes 0 to 1000, not {}",
@@ -148,12 +147,18 @@ fn build_line(
         ..LineOptions::default()
     });
     let clock_start = crate::base::Time::ZERO;
-    for &(id, device) in servos {
+    for &Asked {
+        id,
+        device,
+        firmware,
+    } in servos
+    {
         if args.factory {
-            line.attach(id, Servo::factory(device));
+            line.attach(id, Servo::factory(device).with_firmware(firmware));
             line.set_plugged(id, servos.len() == 1, clock_start);
         } else {
-            line.attach(id, Servo::commissioned(device, id, code));
+            let servo = Servo::commissioned(device, id, code);
+            line.attach(id, servo.with_firmware(firmware));
         }
     }
     for spec in &args.faults {
@@ -163,11 +168,29 @@ fn build_line(
     Ok((line, if args.factory { 57_600 } else { args.baud }))
 }
 
-/// Reads `1-12[:MODEL][,20:MODEL...]`.
-fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Device)>, String> {
-    let mut servos: Vec<(u8, &'static Device)> = Vec::new();
+/// A servo as asked for.
+#[derive(Copy, Clone, Debug)]
+struct Asked {
+    id: u8,
+    device: &'static Device,
+    firmware: u8,
+}
+
+/// Reads `1-12[:MODEL[@FIRMWARE]][,20:MODEL...]`.
+fn parse_servos(list: &str) -> Result<Vec<Asked>, String> {
+    let mut servos: Vec<Asked> = Vec::new();
     for part in list.split(',') {
-        let (ids, name) = part.split_once(':').unwrap_or((part, MODELS[0].model.name));
+        let (ids, kind) = part.split_once(':').unwrap_or((part, MODELS[0].model.name));
+        let (name, firmware) = match kind.split_once('@') {
+            None => (kind, None),
+            Some((name, text)) => {
+                let version = text.parse::<u8>().ok().filter(|version| *version > 0);
+                let version = version.ok_or_else(|| {
+                    format!("--servos: '{text}' is no firmware version 1..255, as in {name}@47")
+                })?;
+                (name, Some(version))
+            }
+        };
         let device = models::model(name).ok_or_else(|| {
             let known = MODELS.iter().map(|device| device.model.name);
             match nearest(name, known.clone()) {
@@ -190,10 +213,14 @@ fn parse_servos(list: &str) -> Result<Vec<(u8, &'static Device)>, String> {
             return Err(format!("--servos: the range '{ids}' runs backwards"));
         }
         for id in first..=last {
-            if servos.iter().any(|(other, _)| *other == id) {
+            if servos.iter().any(|other| other.id == id) {
                 return Err(format!("--servos: servo {id} is named twice"));
             }
-            servos.push((id, device));
+            servos.push(Asked {
+                id,
+                device,
+                firmware: firmware.unwrap_or(device.firmware),
+            });
         }
     }
     Ok(servos)
@@ -240,12 +267,17 @@ fn turn(line: &SharedLine, clock: &dyn Clock, label: u8, degrees: f64) -> bool {
     let steps = (degrees.abs() / HAND_DEG_S / HAND_STEP_S).ceil().max(1.0);
     let pulses = degrees / 360.0 * PULSES_PER_TURN / steps;
     for _ in 0..steps as u32 {
-        let turned = line.lock().servo_mut(label).map(|servo| servo.turn_by_hand(pulses));
+        let turned = line
+            .lock()
+            .servo_mut(label)
+            .map(|servo| servo.turn_by_hand(pulses));
         match turned {
             None => return false,
             Some(true) => {}
             Some(false) => {
-                warn(format_args!("the torque of servo {label} is on and holds it"));
+                warn(format_args!(
+                    "the torque of servo {label} is on and holds it"
+                ));
                 return true;
             }
         }
@@ -269,6 +301,8 @@ mod tests {
             ("1-3,2", "servo 2 is named twice"),
             ("1:xl430-w25", "did you mean 'xl430-w250'?"),
             ("1:frob", "there are xl430-w250"),
+            ("1:xl330-m288@", "no firmware version"),
+            ("1:xl330-m288@256", "no firmware version"),
         ] {
             let message = parse_servos(list).expect_err("a bad list");
             assert!(message.contains(expected), "{list}: {message}");
@@ -278,7 +312,10 @@ mod tests {
     #[test]
     fn ranges_and_single_servos_mix() {
         let servos = parse_servos("1-3,20:XL430-W250").expect("a good list");
-        let ids: Vec<u8> = servos.iter().map(|(id, _)| *id).collect();
+        let ids: Vec<u8> = servos.iter().map(|asked| asked.id).collect();
         assert_eq!(ids, [1, 2, 3, 20]);
+        let servos = parse_servos("1-2:xl330-m288@47,3:xl330-m288").expect("a good list");
+        let firmware: Vec<u8> = servos.iter().map(|asked| asked.firmware).collect();
+        assert_eq!(firmware, [47, 47, 52]);
     }
 }

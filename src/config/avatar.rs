@@ -45,18 +45,17 @@ impl Avatar {
         let key = "avatar.model";
         let name = entry.model.get_ref();
         let bad = |problem: String| at.at(entry.model.span(), key, problem);
-        let path = path_of(files, name).map_err(&bad)?;
+        let (path, bytes) = motion_file(files, name).map_err(&bad)?;
         let options = options(entry.unit_m);
         let is_gltf = [".glb", ".gltf", ".vrm"].iter().any(|e| name.ends_with(e));
         let skeleton = if is_gltf {
             let file = path.display();
-            let bytes =
-                std::fs::read(&path).map_err(|e| bad(format!("{file}: cannot be read: {e}")))?;
             let read = GltfFile::parse(&bytes, "model", path.parent(), &options)
                 .map_err(|e| bad(format!("{file}: {e}")))?;
             read.skeleton
         } else {
-            let read = import::open(&path, &options).map_err(|e| bad(e.to_string()))?;
+            let read =
+                import::open_bytes(&path, &bytes, &options).map_err(|e| bad(e.to_string()))?;
             match read.takes.into_iter().next().map(|take| take.body) {
                 Some(TakeBody::Skeleton(skeleton)) => skeleton,
                 _ => {
@@ -113,8 +112,9 @@ impl Avatar {
         kind: Option<ClipKind>,
     ) -> Result<ClipFile, String> {
         let (file, part) = split_part(name)?;
-        let path = path_of(files, file)?;
-        let read = import::open(&path, &options(self.unit_m)).map_err(|e| e.to_string())?;
+        let (path, bytes) = motion_file(files, file)?;
+        let read =
+            import::open_bytes(&path, &bytes, &options(self.unit_m)).map_err(|e| e.to_string())?;
         let names: Vec<String> = read.takes.iter().map(|t| t.name.clone()).collect();
         let Ok([take]) = <[Take; 1]>::try_from(read.takes) else {
             return Err(format!(
@@ -288,11 +288,16 @@ fn options(unit_m: Option<f64>) -> ImportOptions {
     }
 }
 
-fn path_of(files: &Files, name: &str) -> Result<PathBuf, String> {
-    match files {
-        Files::Folder(folder) => Ok(folder.join(name)),
-        Files::Embedded => Err(format!("{name}: motion files are not part of the program")),
-    }
+/// A motion file, which may end in `#NAME`, as a path and its content.
+fn motion_file(files: &Files, name: &str) -> Result<(PathBuf, Vec<u8>), String> {
+    let file = name.split_once('#').map_or(name, |(file, _)| file);
+    let path = match files.place() {
+        Files::Folder(folder) => folder.join(name),
+        Files::Embedded => return Err(format!("{name}: motion files are not part of the program")),
+        Files::Kept(_) => PathBuf::from(name),
+    };
+    let bytes = files.bytes(file).map_err(|e| e.to_string())?;
+    Ok((path, bytes))
 }
 
 /// A part of a motion, seconds.

@@ -11,8 +11,10 @@ use super::layer::{LayerParts, layer_parts};
 use super::motion::{GraphParts, clip, graph_parts, neighbourhoods, read};
 use super::numbers::check_numbers;
 use super::parts::{Parts, parts};
+use super::record::{RecordOptions, record_options};
 use super::safety::Safety;
 use super::search::{SearchParts, search_parts};
+use super::servos::check_stopping;
 use crate::bus::BusAddress;
 use crate::bus::dynamixel::ServoSpec;
 use crate::gesture::{
@@ -37,6 +39,8 @@ pub struct Character {
     pub name: String,
     /// The configuration's name for messages.
     pub config_name: String,
+    /// The configuration's name among its files.
+    pub config_file: String,
     /// Where its files are.
     pub files: Files,
     /// Pose source as written, such as `file:performances/x.csv`.
@@ -73,6 +77,8 @@ pub struct Character {
     pub safety: Safety,
     /// Pictures per second of the terminal view.
     pub view_hz: f64,
+    /// What is kept of runs.
+    pub record: RecordOptions,
     graph: GraphParts,
     search: Option<SearchParts>,
     layers: Vec<LayerParts>,
@@ -190,6 +196,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         None => EstimatorKind::default(),
     };
     let safety = &file.safety;
+    check_stopping(&servos, safety.on_exit, wire.watchdog_ms, &at)?;
     let front_options = FrontEndOptions {
         estimator,
         lambda: file.input.window,
@@ -199,6 +206,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
     let character = Character {
         name: file.name.clone(),
         config_name: file_name.clone(),
+        config_file: name.into(),
         source: file.input.source.get_ref().clone(),
         front_options,
         gesture_texts: (paths, texts),
@@ -209,6 +217,7 @@ pub fn load(files: Files, name: &str) -> Result<Character, ConfigError> {
         rate_hz: wire.rate_hz,
         watchdog_ms: wire.watchdog_ms,
         view_hz: file.view.refresh_hz,
+        record: record_options(&file.record, &files, &at)?,
         files,
         model,
         body,

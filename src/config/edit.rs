@@ -9,7 +9,9 @@ use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 /// # Errors
 /// The text is no TOML, has no `robot.joint`, or lacks one of the joints.
 pub fn with_joint_map(text: &str, servos: &[ServoSpec]) -> Result<String, String> {
-    let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
+    let mut document: DocumentMut = text
+        .parse()
+        .map_err(|e: toml_edit::TomlError| e.to_string())?;
     let joints = document
         .get_mut("robot")
         .and_then(|robot| robot.get_mut("joint"))
@@ -18,7 +20,11 @@ pub fn with_joint_map(text: &str, servos: &[ServoSpec]) -> Result<String, String
         let entry = entry(joints, &servo.joint)
             .ok_or_else(|| format!("robot.joint has no entry named {:?}", servo.joint))?;
         let direction = servo.direction.sign() as i64;
-        set(entry, "zero_pulse", Value::from(i64::from(servo.zero_pulse)));
+        set(
+            entry,
+            "zero_pulse",
+            Value::from(i64::from(servo.zero_pulse)),
+        );
         set(entry, "direction", Value::from(direction));
         let range = [servo.min_pulse, servo.max_pulse].map(i64::from);
         set(entry, "range_pulse", Value::Array(Array::from_iter(range)));
@@ -85,7 +91,10 @@ mod tests {
         let again = with_joint_map(&changed, &[servo("one")]).expect("a good file");
         assert_eq!(again, changed, "what is there already stays");
         let both = with_joint_map(&changed, &[servo("two")]).expect("a good file");
-        assert!(both.contains("servo = 12, zero_pulse = 1990, direction = -1"), "{both}");
+        assert!(
+            both.contains("servo = 12, zero_pulse = 1990, direction = -1"),
+            "{both}"
+        );
     }
 
     #[test]
@@ -105,7 +114,10 @@ mod tests {
             ("[robot]\njoint = 3\n", "no entry named \"one\""),
         ] {
             let error = with_joint_map(text, &[servo("one")]).expect_err(text);
-            assert!(error.contains(part) || part == "expected", "{text}: {error}");
+            assert!(
+                error.contains(part) || part == "expected",
+                "{text}: {error}"
+            );
         }
     }
 }

@@ -1,9 +1,11 @@
 //! The TOML of a character, as a user writes it. Every key is commented in `configs/quadruped.toml`,
 //! `[[channel]]` in `configs/face.toml`, `map` in `configs/arm.toml`.
 
+mod record;
 mod robot;
 mod safety;
 
+pub use record::RecordEntry;
 pub use robot::{BusEntry, JointEntry, RobotEntry};
 pub use safety::{OnExit, OnLost, OnServoFault, SafetyEntry};
 
@@ -45,6 +47,9 @@ pub struct CharacterFile {
     /// The terminal view.
     #[serde(default)]
     pub view: ViewEntry,
+    /// What is kept of runs.
+    #[serde(default)]
+    pub record: RecordEntry,
 }
 
 /// Where poses come from.

@@ -102,7 +102,7 @@ impl GestureFiles {
     /// pose map reads belongs to its front end, so one with a map keeps its gestures.
     pub fn can_change(&self) -> bool {
         let mapped = self.reader.classes.iter().any(|class| class.map.is_some());
-        matches!(self.files, Files::Folder(_)) && !mapped
+        matches!(self.files.place(), Files::Folder(_)) && !mapped
     }
 
     /// Gesture names, in the order of the estimates.

@@ -19,6 +19,7 @@ pub mod map;
 mod motion;
 mod numbers;
 mod parts;
+pub mod record;
 pub mod safety;
 mod search;
 mod servos;

@@ -198,6 +198,9 @@ fn cycles(
                 record.late_us = (late_s * 1e6) as u64;
                 record.step_us = step_us;
                 record.overruns = stats.overruns;
+                record.missed = stats.missed;
+                record.pose_to_wire_us = stats.latest_pose_to_wire_us.filter(|_| last);
+                record.fill_health(parts.bus.health());
                 parts.recorder.commit();
             }
             let stage = parts.puppet.stage();
@@ -260,10 +263,12 @@ fn send(
     let report = parts
         .bus
         .exchange(&parts.puppet.targets().positions, states)?;
-    if let Some(arrived_s) = newest_sample_s {
+    stats.latest_pose_to_wire_us = newest_sample_s.map(|arrived_s| {
         let sent = began + Duration::from_micros(u64::from(report.goal_sent_us));
-        let waited_s = sent.secs_since(start) - arrived_s;
-        stats.pose_to_wire.add((waited_s.max(0.0) * 1e6) as u64);
+        ((sent.secs_since(start) - arrived_s).max(0.0) * 1e6) as u64
+    });
+    if let Some(waited_us) = stats.latest_pose_to_wire_us {
+        stats.pose_to_wire.add(waited_us);
     }
     Ok(report)
 }

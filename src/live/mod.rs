@@ -5,6 +5,7 @@
 //! [`session`] runs it, on a thread in real time or inline in virtual time.
 
 pub mod arrival;
+pub mod bus_bench;
 pub mod clock;
 pub mod control;
 pub mod drive;
@@ -14,6 +15,7 @@ pub mod keys;
 pub mod playback;
 pub mod realtime;
 pub mod record;
+pub mod recording;
 pub mod reload;
 pub mod session;
 pub mod source;

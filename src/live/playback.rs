@@ -132,10 +132,16 @@ impl Playback {
         let stride = ((SPEED_OVER_S / dt_s).round() as usize).clamp(1, self.take.len() - 1);
         for ((column, joint), limit) in self.columns.iter().zip(joints).zip(limits) {
             let Some(column) = *column else { continue };
-            let q = |row: usize| self.take.poses[row].get(column).copied().unwrap_or(f64::NAN);
+            let q = |row: usize| {
+                self.take.poses[row]
+                    .get(column)
+                    .copied()
+                    .unwrap_or(f64::NAN)
+            };
             for row in 0..self.take.len() {
                 // Written so that NaN fails.
-                let inside = q(row) >= limit.lower - ROUNDING_RAD && q(row) <= limit.upper + ROUNDING_RAD;
+                let inside =
+                    q(row) >= limit.lower - ROUNDING_RAD && q(row) <= limit.upper + ROUNDING_RAD;
                 if !inside {
                     return Err(PlaybackError::Outside {
                         joint: joint.clone(),
@@ -148,14 +154,17 @@ impl Playback {
             }
             let speed = |row: usize| (q(row + stride) - q(row)).abs() / (stride as f64 * dt_s);
             let rows = 0..self.take.len() - stride;
-            let fastest = rows.max_by(|a, b| speed(*a).total_cmp(&speed(*b))).unwrap_or(0);
+            let fastest = rows
+                .max_by(|a, b| speed(*a).total_cmp(&speed(*b)))
+                .unwrap_or(0);
             if speed(fastest) > limit.velocity {
                 return Err(PlaybackError::Fast {
                     joint: joint.clone(),
                     found: speed(fastest).to_degrees(),
                     t_s: fastest as f64 * dt_s,
                     limit: limit.velocity.to_degrees(),
-                    share: (0.95 * self.speed * limit.velocity / speed(fastest) * 100.0).floor() / 100.0,
+                    share: (0.95 * self.speed * limit.velocity / speed(fastest) * 100.0).floor()
+                        / 100.0,
                 });
             }
         }
@@ -255,8 +264,14 @@ mod tests {
     fn positions_and_speeds_beyond_the_limits_are_named_with_their_time() {
         let away = (0..50).map(|k| vec![0.0, 0.03 * f64::from(k)]).collect();
         let playback = Playback::new(take(&["a", "b"], away), &joints(), 1.0).expect("joints");
-        let text = playback.check(&joints(), &limits()).expect_err("outside").to_string();
-        assert!(text.contains("b is to go to 58.") && text.contains("0.68 s"), "{text}");
+        let text = playback
+            .check(&joints(), &limits())
+            .expect_err("outside")
+            .to_string();
+        assert!(
+            text.contains("b is to go to 58.") && text.contains("0.68 s"),
+            "{text}"
+        );
 
         let fast: Vec<Vec<f64>> = (0..20).map(|k| vec![0.06 * f64::from(k.min(10))]).collect();
         let playback = Playback::new(take(&["a"], fast.clone()), &joints(), 1.0).expect("joints");

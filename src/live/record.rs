@@ -2,7 +2,7 @@
 
 use crate::base::JointState;
 use crate::body::RootPose;
-use crate::bus::CycleReport;
+use crate::bus::{CycleReport, ServoHealth};
 use crate::gesture::GestureEstimate;
 use crate::motion::class::Played;
 use crate::motion::graph::Transition;
@@ -52,6 +52,12 @@ pub struct CycleRecord {
     pub step_us: u64,
     /// Overruns so far.
     pub overruns: u64,
+    /// Cycles so far whose bus exchange ended after the next deadline.
+    pub missed: u64,
+    /// From the arrival of the newest sample of this cycle to its goals on the wire, microseconds.
+    pub pose_to_wire_us: Option<u64>,
+    /// How each servo is.
+    pub health: Vec<ServoHealth>,
 }
 
 impl CycleRecord {
@@ -63,6 +69,11 @@ impl CycleRecord {
             &vec![JointState::default(); puppet.targets().positions.len()],
         );
         record
+    }
+
+    /// Copies how the servos are.
+    pub fn fill_health(&mut self, health: &[ServoHealth]) {
+        refill(&mut self.health, health.iter().copied());
     }
 
     /// Copies the puppet's state of the last step.
@@ -166,6 +177,7 @@ pub fn record_queue(puppet: &Puppet, depth: usize) -> (QueueRecorder, RecordRead
         let mut record = Box::new(blank.clone());
         // Gestures that are defined while the run goes on must find room without an allocation.
         record.gestures.reserve(MORE_GESTURES);
+        record.health.reserve(record.states.len());
         record
     };
     while spare_in.push(roomy()).is_ok() {}

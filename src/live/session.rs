@@ -1,10 +1,11 @@
 //! A session: a character, its poses and its bus, run to the end in real or in virtual time.
 
 use super::arrival::Hangup;
-use super::control::{self, ControlOptions, Ending, Outcome, Parts};
+use super::control::{ControlOptions, Ending, Outcome, Parts};
 use super::feed::{ReaderFeed, read_ahead};
 use super::realtime::{self, RealTime};
 use super::record::{CycleRecord, Inline, record_queue};
+use super::recording::{Taps, tap};
 use super::reload::{self, News, Watcher};
 use super::stats::Stats;
 use super::stop::StopSwitch;
@@ -161,6 +162,8 @@ pub struct Session<R> {
     pub stop: StopSwitch,
     /// Rate, duration, what happens at the end.
     pub options: ControlOptions,
+    /// Logs of all that reaches the run from outside; the bus's ports are tapped already.
+    pub taps: Option<Taps>,
     /// Called with the bus clock's time of cycle 0, right after the servos were armed.
     pub on_start: Box<dyn FnMut(Time) + Send>,
 }
@@ -175,7 +178,8 @@ pub fn run_virtual<R: BufRead>(
 ) -> Report {
     let mut feed = ReaderFeed::new(session.reader, session.first);
     let mut recorder = Inline::new(&session.puppet, |record| observer.cycle(record));
-    let outcome = control::run(
+    let outcome = tap::run(
+        session.taps.as_ref(),
         Parts {
             puppet: &mut session.puppet,
             bus: session.bus.as_mut(),
@@ -222,13 +226,14 @@ pub fn run_real<R: BufRead + Send + 'static>(
     let (mut feed, reading) = read_ahead(session.reader, session.first, session.live.is_some())?;
     let (mut recorder, mut records) = record_queue(&session.puppet, RECORDS);
     let (mut puppet, mut bus, mut on_start) = (session.puppet, session.bus, session.on_start);
-    let (stop, options) = (session.stop, session.options);
+    let (stop, options, taps) = (session.stop, session.options, session.taps);
     let emergency = stop.clone();
     let control = std::thread::Builder::new()
         .name("control".into())
         .spawn(move || {
             let real_time = realtime::request();
-            let outcome = control::run(
+            let outcome = tap::run(
+                taps.as_ref(),
                 Parts {
                     puppet: &mut puppet,
                     bus: bus.as_mut(),

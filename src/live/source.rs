@@ -194,9 +194,9 @@ pub fn open(source: &str, files: &Files) -> Result<SourceReader, SourceError> {
             }
         });
     }
-    match files {
+    match files.place() {
         Files::Folder(folder) => open_file(&folder.join(rest)),
-        Files::Embedded => {
+        Files::Embedded | Files::Kept(_) => {
             let name = files.name(rest);
             let format = PoseFormat::of(Path::new(rest))?;
             let text = files.read(rest)?;

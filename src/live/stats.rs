@@ -115,6 +115,8 @@ pub struct Stats {
     pub lateness: Microseconds,
     /// From a sample's arrival to the last goal byte handed to the port.
     pub pose_to_wire: Microseconds,
+    /// The same of the latest cycle, if a sample was used in it.
+    pub latest_pose_to_wire_us: Option<u64>,
     /// Faults, oldest first.
     pub faults: Vec<ServoFault>,
     /// Faults beyond those kept.
@@ -141,6 +143,7 @@ impl Default for Stats {
             exchange: Microseconds::default(),
             lateness: Microseconds::default(),
             pose_to_wire: Microseconds::default(),
+            latest_pose_to_wire_us: None,
             faults: Vec::with_capacity(FAULTS_KEPT),
             more_faults: 0,
             open: [0; FaultKind::ALL.len()],

@@ -14,10 +14,22 @@ pub enum StopRequest {
     AtOnce,
 }
 
+/// Looks at what the control thread sees of values that others set while it runs: to record it, or to show it
+/// again what it saw then.
+pub trait Witness: Send + Sync + std::fmt::Debug {
+    /// The control thread is about to see `value` of the kind `what` (each kind has a number of its own); what
+    /// it is to see.
+    fn see(&self, what: u8, value: u64) -> u64;
+}
+
+/// The kind of value that presses of the stop switch are to a [`Witness`].
+pub const STOP_PRESSES: u8 = 1;
+
 /// Counts requests to stop; clones share the count.
 #[derive(Clone, Debug, Default)]
 pub struct StopSwitch {
     presses: Arc<AtomicUsize>,
+    witness: Option<Arc<dyn Witness>>,
 }
 
 impl StopSwitch {
@@ -48,9 +60,23 @@ impl StopSwitch {
         self.presses.fetch_add(1, Ordering::SeqCst);
     }
 
+    /// The same switch for the control thread alone, with a witness to what it is asked for.
+    #[must_use]
+    pub fn witnessed(&self, witness: Arc<dyn Witness>) -> Self {
+        Self {
+            presses: Arc::clone(&self.presses),
+            witness: Some(witness),
+        }
+    }
+
     /// What is asked for.
     pub fn request(&self) -> StopRequest {
-        match self.presses.load(Ordering::SeqCst) {
+        let presses = self.presses.load(Ordering::SeqCst) as u64;
+        let seen = match &self.witness {
+            Some(witness) => witness.see(STOP_PRESSES, presses),
+            None => presses,
+        };
+        match seen {
             0 => StopRequest::None,
             1 => StopRequest::Orderly,
             _ => StopRequest::AtOnce,

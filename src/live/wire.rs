@@ -8,8 +8,8 @@ use crate::bus::dynamixel::{
 use crate::bus::port::WrapPort;
 use crate::bus::{BusAddress, NoServos, PortError, ServoBus};
 use crate::config::Character;
-use crate::sim::{self, FaultSpec, Line, LineOptions, SharedLine, SimPort};
-use handwave_dynamixel::baud::RateList;
+use crate::sim::{self, FaultSpec, Line, LineOptions, Servo, SharedLine, SimPort};
+use handwave_dynamixel::baud::{self, RateList};
 use handwave_dynamixel::wire;
 use std::sync::Arc;
 use std::time::Duration;
@@ -83,10 +83,8 @@ pub fn open(
             let line = simulated_line(character)?;
             let port = SimPort::new(line.clone(), clock, character.sim_baud);
             let port = wrap("sim", Box::new(port));
-            (
-                Box::new(Master::new(port, MasterOptions::default())),
-                Some(line),
-            )
+            let options = MasterOptions::of(port.as_ref());
+            (Box::new(Master::new(port, options)), Some(line))
         }
         BusAddress::Dynamixel {
             path,
@@ -101,15 +99,17 @@ pub fn open(
     })
 }
 
+/// The servos of a character as commissioned for it: model and mode are those that it wants.
 fn simulated_line(character: &Character) -> Result<SharedLine, WireError> {
-    let name = character.servos.first().map_or("", |s| s.model.name);
-    let device = sim::models::model(name).ok_or_else(|| WireError::Model(name.into()))?;
-    let ids = character.servos.iter().map(|s| s.id);
-    let line = Line::commissioned(device, ids, character.sim_baud, LineOptions::default()).ok_or(
-        WireError::Baud {
-            baud: character.sim_baud,
-        },
-    )?;
+    let rate = character.sim_baud;
+    let code = baud::code(rate).ok_or(WireError::Baud { baud: rate })?;
+    let mut line = Line::new(LineOptions::default());
+    for spec in &character.servos {
+        let name = spec.model.name;
+        let device = sim::models::model(name).ok_or_else(|| WireError::Model(name.into()))?;
+        let servo = Servo::commissioned(device, spec.id, code).with_mode(spec.mode);
+        line.attach(spec.id, servo);
+    }
     Ok(SharedLine::new(line))
 }
 

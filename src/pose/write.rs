@@ -81,6 +81,13 @@ impl<W: Write> PoseWriter<W> {
         outcome
     }
 
+    /// One sample as a line of JSON without its end, as [`PoseWriter::write`] writes it.
+    pub fn line(&self, sample: &PoseSample) -> String {
+        let mut text = String::new();
+        self.json_line(sample, &mut text);
+        text
+    }
+
     fn json_line(&self, sample: &PoseSample, text: &mut String) {
         text.push_str("{\"t\":");
         number(text, sample.t, 4);

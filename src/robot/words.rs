@@ -33,7 +33,10 @@ impl RobotModel {
             }
             let pose = self.link_pose(link, positions);
             let tip = self.tips.get(link).copied().flatten();
-            for point in [Some(pose.translation.vector), tip.map(|t| (pose * t).coords)] {
+            for point in [
+                Some(pose.translation.vector),
+                tip.map(|t| (pose * t).coords),
+            ] {
                 let Some(point) = point else { continue };
                 let way = axis.cross(&(point - centre));
                 if way.norm() > furthest.0 + 1e-6 {
@@ -93,7 +96,10 @@ mod tests {
         for way in &ways[1..4] {
             assert!(way.contains("goes") && way.contains("down"), "{ways:?}");
         }
-        assert!(ways[4].contains("screw") && ways[4].contains("forward"), "{ways:?}");
+        assert!(
+            ways[4].contains("screw") && ways[4].contains("forward"),
+            "{ways:?}"
+        );
         assert_eq!(model.positive_way(9, &rest), "");
     }
 }

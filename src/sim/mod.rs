@@ -11,6 +11,7 @@ pub mod fault;
 mod instructions;
 pub mod line;
 pub mod models;
+mod modes;
 pub mod motor;
 pub mod port;
 pub mod pty;

@@ -1,31 +1,32 @@
 //! What a servo's registers show of it, and what writing them does to it.
 
-use super::servo::{FULL_PWM, Servo};
+use super::servo::Servo;
 use super::table::TableError;
 use crate::base::Time;
-use crate::bus::dynamixel::model::{POSITION_MODE, VELOCITY_UNIT_RAD_S, address};
-use std::f64::consts::TAU;
+use crate::bus::dynamixel::model::{POSITION_MODE, TURNS_EITHER_WAY, address};
+use std::f64::consts::{PI, TAU};
 
-/// Pulses from the goal within which a servo counts as in position.
-const IN_POSITION_PULSES: f64 = 10.0;
-/// Pulses from the path beyond which Moving Status tells a following error.
-const FOLLOWING_ERROR_PULSES: f64 = 200.0;
+/// Share of a turn from the goal within which a servo counts as in position.
+const IN_POSITION_TURNS: f64 = 10.0 / 4096.0;
+/// Share of a turn from the path beyond which Moving Status tells a following error.
+const FOLLOWING_ERROR_TURNS: f64 = 200.0 / 4096.0;
 
 impl Servo {
     /// Brings the registers that show the present state up to date.
     pub(super) fn refresh(&mut self, now: Time) {
         let pulses = self.position_pulses();
         let direction = self.setpoint.direction;
-        let speed = self.speed_rad_s() / VELOCITY_UNIT_RAD_S;
+        let model = self.table.device().model;
+        let speed = self.speed_rad_s() / model.velocity_unit_rad_s;
         let path = self.to_pulses(self.profile.angle_rad);
-        let path_speed = self.profile.speed_rad_s * direction / VELOCITY_UNIT_RAD_S;
+        let path_speed = self.profile.speed_rad_s * direction / model.velocity_unit_rad_s;
         let positioning = self.setpoint.torque_on && self.is_positioning();
         let on_the_way = positioning && !self.profile.arrived(self.setpoint.goal_rad);
         let threshold = f64::from(self.table.get(address::MOVING_THRESHOLD));
         let moving = speed.abs() > threshold || on_the_way;
         let goal = self.to_pulses(self.setpoint.goal_rad);
         let mut status = 0;
-        if positioning && (goal - pulses).abs() <= IN_POSITION_PULSES {
+        if positioning && (goal - pulses).abs() <= IN_POSITION_TURNS * model.pulses_per_turn {
             status |= 1;
         }
         if on_the_way {
@@ -36,11 +37,11 @@ impl Servo {
             };
             status |= 1 << 1 | shape << 4;
         }
-        if positioning && (path - pulses).abs() > FOLLOWING_ERROR_PULSES {
+        if positioning && (path - pulses).abs() > FOLLOWING_ERROR_TURNS * model.pulses_per_turn {
             status |= 1 << 3;
         }
         let tick = now.saturating_since(self.booted_at).as_millis() % 32_768;
-        let voltage = self.ailments.voltage_v.unwrap_or(11.1);
+        let voltage = self.ailments.voltage_v.unwrap_or(self.nominal_v());
         let temperature = self.ailments.temperature_c.unwrap_or(32.0);
         for (register, value) in [
             (address::REALTIME_TICK, tick as i64),
@@ -48,11 +49,11 @@ impl Servo {
             (address::MOVING_STATUS, status),
             (
                 address::PRESENT_PWM,
-                (self.motor.duty * direction * FULL_PWM).round() as i64,
+                (self.motor.duty * direction * self.full_pwm()).round() as i64,
             ),
             (
                 address::PRESENT_LOAD,
-                (self.motor.effort() * direction * 1000.0).round() as i64,
+                (self.shown_effort() * direction).round() as i64,
             ),
             (address::PRESENT_VELOCITY, speed.round() as i64),
             (address::PRESENT_POSITION, pulses.round() as i64),
@@ -76,7 +77,8 @@ impl Servo {
         let torque_on = self.setpoint.torque_on;
         self.table.store(address, data);
         let touched = |register: u16| {
-            (0..data.len()).any(|i| self.table.resolve(address + i as u16) == register)
+            (0..data.len())
+                .any(|i| self.table.x_series(self.table.resolve(address + i as u16)) == register)
         };
         let goal_written = touched(address::GOAL_POSITION);
         let mode_written = touched(address::OPERATING_MODE);
@@ -108,26 +110,35 @@ impl Servo {
 
     /// What the register's neighbours allow: limits, modes, the watchdog's lock.
     pub(super) fn check_value(&self, register: u16, value: i64) -> Result<(), TableError> {
+        let register = self.table.x_series(register);
         let limit = |addr| i64::from(self.table.get(addr));
         let goal = matches!(
             register,
-            address::GOAL_PWM | address::GOAL_VELOCITY | address::GOAL_POSITION
+            address::GOAL_PWM
+                | address::GOAL_CURRENT
+                | address::GOAL_VELOCITY
+                | address::GOAL_POSITION
         );
         if goal && self.watchdog_tripped() {
             return Err(TableError::Range);
         }
         let within = match register {
             address::GOAL_PWM => value.abs() <= limit(address::PWM_LIMIT),
+            address::GOAL_CURRENT => value.abs() <= limit(address::CURRENT_LIMIT),
             address::GOAL_VELOCITY => value.abs() <= limit(address::VELOCITY_LIMIT),
             address::GOAL_POSITION => match self.mode() {
                 POSITION_MODE => {
+                    let limit = |addr| i64::from(self.table.get_signed(addr));
                     let allowed =
                         limit(address::MIN_POSITION_LIMIT)..=limit(address::MAX_POSITION_LIMIT);
                     allowed.contains(&value)
                 }
-                _ => value.abs() < 256 * 4096,
+                _ => {
+                    let turn = self.table.device().model.pulses_per_turn as i64;
+                    value.abs() < i64::from(TURNS_EITHER_WAY) * turn
+                }
             },
-            address::OPERATING_MODE if !self.modes().contains(&(value as u8)) => {
+            address::OPERATING_MODE if !self.has_mode(value) => {
                 return Err(TableError::Range);
             }
             _ => true,
@@ -139,9 +150,11 @@ impl Servo {
         }
     }
 
-    /// Forgets full turns: the position comes back into 0..4095, apart from the homing offset.
+    /// Forgets full turns: the position comes back into one turn around the centre, 0..4095 on X series servos, apart from
+    /// the homing offset.
     pub(super) fn clear_turns(&mut self) {
-        self.motor.angle_rad = self.motor.angle_rad.rem_euclid(TAU);
+        let begin = self.centre_rad() - PI;
+        self.motor.angle_rad = begin + (self.motor.angle_rad - begin).rem_euclid(TAU);
         self.profile.angle_rad = self.motor.angle_rad;
         self.profile.speed_rad_s = 0.0;
         let pulses = self.position_pulses().round() as i64;
@@ -151,34 +164,7 @@ impl Servo {
 
     /// Whether the shaft turns or is on its way.
     pub(super) fn is_moving(&self) -> bool {
-        self.speed_rad_s().abs() / VELOCITY_UNIT_RAD_S
+        self.speed_rad_s().abs() / self.table.device().model.velocity_unit_rad_s
             > f64::from(self.table.get(address::MOVING_THRESHOLD))
-    }
-
-    fn mode(&self) -> u8 {
-        self.table.get(address::OPERATING_MODE) as u8
-    }
-
-    fn modes(&self) -> &'static [u8] {
-        self.table.device().modes
-    }
-
-    fn change_mode(&mut self) {
-        self.table
-            .reset(|a| (address::VELOCITY_I_GAIN..=address::FEEDFORWARD_1ST_GAIN).contains(&a));
-        self.table.set(address::PROFILE_ACCELERATION, 0);
-        self.table.set(address::PROFILE_VELOCITY, 0);
-        self.table.set(address::GOAL_VELOCITY, 0);
-        self.table.set(
-            address::GOAL_PWM,
-            i64::from(self.table.get(address::PWM_LIMIT)),
-        );
-        if self.mode() == POSITION_MODE {
-            self.take_setpoint();
-            self.clear_turns();
-        } else {
-            let pulses = self.position_pulses().round() as i64;
-            self.table.set(address::GOAL_POSITION, pulses);
-        }
     }
 }

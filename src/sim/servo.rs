@@ -1,26 +1,18 @@
 //! One simulated servo: control table, motor, latched errors, bus watchdog, moved along by time alone.
 
+use super::modes::centre_rad;
 use super::motor::{Motor, Profile, SUBSTEP_NANOS};
 use super::table::{ControlTable, Device};
 use crate::base::Time;
-use crate::bus::dynamixel::model::{PULSES_PER_TURN, RAM_BEGIN, VELOCITY_UNIT_RAD_S, address};
+use crate::bus::dynamixel::model::{PULSES_PER_TURN, RAM_BEGIN, address};
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-/// Radians of one position pulse.
+/// Radians of one position pulse of an X series servo.
 pub const PULSE_RAD: f64 = TAU / PULSES_PER_TURN;
-/// Radians per second squared of one profile acceleration unit: 214.577 rev/min^2.
-pub const ACCELERATION_UNIT_RAD_S2: f64 = 214.577 * TAU / 3600.0;
 /// How long a servo is deaf and mute after a reboot.
 pub const BOOT_TIME: Duration = Duration::from_millis(250);
 
-/// Goal PWM at full duty.
-pub(super) const FULL_PWM: f64 = 885.0;
-/// Position P Gain that makes one PWM unit per pulse of error.
-///
-/// The manual divides by 128; 100 makes up for the derivative gain, which is not modelled, and lets
-/// a servo at the default gain of 640 follow a steadily moving goal some 35 ms behind.
-const POSITION_P_DIVISOR: f64 = 100.0;
 /// Velocity error, as a share of the no-load speed, times this is duty in velocity mode.
 const VELOCITY_GAIN: f64 = 4.0;
 
@@ -49,6 +41,8 @@ pub(super) struct Setpoint {
     pub goal_duty: f64,
     pub duty_limit: f64,
     pub duty_per_rad: f64,
+    /// Goal current as a share of the stall current; of a position mode the most that is used.
+    pub goal_current: f64,
     pub speed: Option<f64>,
     pub acceleration: Option<f64>,
     pub direction: f64,
@@ -73,12 +67,12 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// A servo out of the box: id 1, 57,600 baud, return delay 500 us, torque off, position 2048.
+    /// A servo out of the box: id 1, 57,600 baud, return delay 500 us, torque off, in the middle of the turn.
     pub fn factory(device: &'static Device) -> Self {
         let table = ControlTable::new(device);
         let mut servo = Self {
             table,
-            motor: Motor::new(device.motor, 2048.0 * PULSE_RAD),
+            motor: Motor::new(device.motor, centre_rad(device)),
             profile: Profile::default(),
             setpoint: Setpoint::default(),
             ailments: Ailments::default(),
@@ -103,16 +97,19 @@ impl Servo {
         servo
     }
 
-    /// The same servo with another firmware version; before 45 an XL430 knows no fast reads.
+    /// The same servo with another firmware version; before 45 an XL430 knows no fast reads, before 52 a servo of the 330
+    /// size has its indirect data elsewhere.
     pub fn with_firmware(mut self, version: u8) -> Self {
-        self.table
-            .set(address::FIRMWARE_VERSION, i64::from(version));
+        let mut table = ControlTable::with_firmware(self.table.device(), version);
+        // The indirect addresses behind are those of the new firmware.
+        table.copy_from(&self.table, |register| register <= address::BACKUP_READY);
+        self.table = table;
         self
     }
 
-    /// The same servo resting at `angle_rad` from pulse 2048, its goal there too.
+    /// The same servo resting at `angle_rad` from the middle of the turn, its goal there too.
     pub fn with_angle(mut self, angle_rad: f64) -> Self {
-        self.motor.angle_rad = 2048.0 * PULSE_RAD + angle_rad;
+        self.motor.angle_rad = self.centre_rad() + angle_rad;
         let pulses = self.position_pulses().round() as i64;
         self.table.set(address::GOAL_POSITION, pulses);
         self.take_setpoint();
@@ -134,9 +131,9 @@ impl Servo {
         self.to_pulses(self.motor.angle_rad)
     }
 
-    /// Angle from pulse 2048, radians, in the register's direction.
+    /// Angle from the middle of the turn, radians, in the register's direction.
     pub fn angle_rad(&self) -> f64 {
-        (self.position_pulses() - 2048.0) * PULSE_RAD
+        (self.position_pulses() - self.centre_pulse()) * self.pulse_rad()
     }
 
     /// Speed in the register's direction, rad/s.
@@ -144,7 +141,7 @@ impl Servo {
         self.motor.speed_rad_s * self.setpoint.direction
     }
 
-    /// The value of a register as it stands, unsigned; 0 for an address without register.
+    /// The value of the register at an X series address as it stands, unsigned; 0 for an address without register.
     pub fn register(&self, addr: u16) -> u32 {
         self.table.get(addr)
     }
@@ -213,10 +210,7 @@ impl Servo {
         self.held_write = None;
         self.table
             .set(address::TORQUE_ENABLE, i64::from(restore & 1));
-        self.table.set(
-            address::GOAL_PWM,
-            i64::from(self.table.get(address::PWM_LIMIT)),
-        );
+        self.goals_to_limits();
         self.take_setpoint();
         self.clear_turns();
         self.latch_errors();
@@ -234,25 +228,31 @@ impl Servo {
         let pwm_limit = f64::from(table.get(address::PWM_LIMIT));
         let direction = if reverse { -1.0 } else { 1.0 };
         let gain = f64::from(table.get(address::POSITION_P_GAIN));
+        let device = table.device();
+        let full_pwm = self.full_pwm();
         let before = self.setpoint;
         self.setpoint = Setpoint {
             mode: table.get(address::OPERATING_MODE) as u8,
             torque_on: table.get(address::TORQUE_ENABLE) != 0,
             goal_rad: 0.0,
             goal_rad_s: f64::from(table.get_signed(address::GOAL_VELOCITY))
-                * VELOCITY_UNIT_RAD_S
+                * device.model.velocity_unit_rad_s
                 * direction,
-            goal_duty: goal_pwm / FULL_PWM * direction,
-            duty_limit: goal_pwm.abs().min(pwm_limit) / FULL_PWM,
-            duty_per_rad: gain / POSITION_P_DIVISOR / PULSE_RAD / FULL_PWM,
+            goal_duty: goal_pwm / full_pwm * direction,
+            duty_limit: goal_pwm.abs().min(pwm_limit) / full_pwm,
+            duty_per_rad: gain * device.duty_per_rad,
+            goal_current: self.goal_current_share() * direction,
             // In time mode the limits follow from each goal's distance.
             speed: match timed {
                 true => before.speed,
-                false => unit(address::PROFILE_VELOCITY, VELOCITY_UNIT_RAD_S),
+                false => unit(address::PROFILE_VELOCITY, device.model.velocity_unit_rad_s),
             },
             acceleration: match timed {
                 true => before.acceleration,
-                false => unit(address::PROFILE_ACCELERATION, ACCELERATION_UNIT_RAD_S2),
+                false => unit(
+                    address::PROFILE_ACCELERATION,
+                    device.model.acceleration_unit_rad_s2,
+                ),
             },
             direction,
         };
@@ -276,16 +276,18 @@ impl Servo {
 
     pub(super) fn to_pulses(&self, angle_rad: f64) -> f64 {
         let offset = f64::from(self.table.get_signed(address::HOMING_OFFSET));
-        2048.0 + (angle_rad / PULSE_RAD - 2048.0) * self.setpoint.direction + offset
+        let centre = self.centre_pulse();
+        centre + (angle_rad / self.pulse_rad() - centre) * self.setpoint.direction + offset
     }
 
     fn to_angle(&self, pulses: f64) -> f64 {
         let offset = f64::from(self.table.get_signed(address::HOMING_OFFSET));
-        (2048.0 + (pulses - offset - 2048.0) * self.setpoint.direction) * PULSE_RAD
+        let centre = self.centre_pulse();
+        (centre + (pulses - offset - centre) * self.setpoint.direction) * self.pulse_rad()
     }
 
     pub(super) fn is_positioning(&self) -> bool {
-        matches!(self.setpoint.mode, 3 | 4)
+        matches!(self.setpoint.mode, 3..=5)
     }
 
     pub(super) fn shut_down(&self) -> bool {
@@ -321,8 +323,10 @@ impl Servo {
         let pulses = self.position_pulses().round() as i64;
         self.table.set(address::GOAL_POSITION, pulses);
         self.table.set(address::GOAL_VELOCITY, 0);
-        if self.setpoint.mode == 16 {
-            self.table.set(address::GOAL_PWM, 0);
+        match self.setpoint.mode {
+            0 => self.table.set(address::GOAL_CURRENT, 0),
+            16 => self.table.set(address::GOAL_PWM, 0),
+            _ => {}
         }
         self.take_setpoint();
         self.profile = Profile {
@@ -361,11 +365,13 @@ impl Servo {
                 let duty = (self.profile.speed_rad_s + VELOCITY_GAIN * error) / full;
                 (duty, self.profile.speed_rad_s == s.goal_rad_s)
             }
+            0 => (self.duty_of_current(s.goal_current), true),
             16 => (s.goal_duty, true),
             _ => {
                 self.profile.step(s.goal_rad, s.speed, s.acceleration);
                 let error = self.profile.angle_rad - self.motor.angle_rad;
-                (error * s.duty_per_rad, self.profile.arrived(s.goal_rad))
+                let duty = self.within_current(error * s.duty_per_rad);
+                (duty, self.profile.arrived(s.goal_rad))
             }
         };
         Control {

@@ -1,7 +1,7 @@
 //! The control table of one servo: bytes, access rules, ranges, indirect slots.
 
 use super::motor::MotorSpec;
-use crate::bus::dynamixel::model::{Access, Model, RAM_BEGIN, Register, address};
+use crate::bus::dynamixel::model::{Access, IndirectBlock, Model, RAM_BEGIN, Register, address};
 use handwave_dynamixel::ErrorCode;
 use std::ops::Range;
 
@@ -45,54 +45,78 @@ impl Cell {
     }
 }
 
-/// A block of indirect slots: slot `i` at `data + i` stands for the byte that `address + 2 i` names.
-#[derive(Copy, Clone, Debug)]
-pub struct IndirectBlock {
-    /// Address of the first indirect address register (2 bytes each).
-    pub address: u16,
-    /// Address of the first indirect data byte.
-    pub data: u16,
-    /// Number of slots.
-    pub slots: u16,
-}
-
-impl IndirectBlock {
-    /// Whether an indirect address register lies at `address`.
-    fn covers(&self, address: u16) -> bool {
-        (self.address..self.address + 2 * self.slots).contains(&address)
-    }
-}
-
 /// A servo as a device: its model, and what the host has no need to know of it.
 #[derive(Debug)]
 pub struct Device {
-    /// Name, number and registers, as the host knows them.
+    /// Name, number, registers and modes, as the host knows them.
     pub model: &'static Model,
-    /// Firmware version given by default; it knows the fast reads.
+    /// Firmware version given by default; it knows the fast reads where the model does.
     pub firmware: u8,
-    /// Values of Operating Mode (11) that the model has.
-    pub modes: &'static [u8],
     /// What its motor can do.
     pub motor: MotorSpec,
-    /// What registers hold at first, by name; those not named hold 0.
+    /// Current at standstill and full duty, ampere.
+    pub stall_a: f64,
+    /// Duty (1 is full) per radian of error and count of the position P gain.
+    pub duty_per_rad: f64,
+    /// What registers hold at first, by name; those of all servos ([`COMMON`]) not named here, and 0 for those in neither.
     pub(super) initial: &'static [(&'static str, i64)],
-    /// Registers where the device takes other values than the host's table says: name, least, greatest.
+    /// Registers where the device takes other values than the host's table says: name, least, greatest. Beside those of all
+    /// servos.
     pub(super) ranges: &'static [(&'static str, i64, i64)],
-    /// Indirect blocks.
-    pub indirect: &'static [IndirectBlock],
 }
 
+/// What registers of every servo hold at first.
+const COMMON: &[(&str, i64)] = &[
+    ("id", 1),
+    ("baud_rate", 1),
+    ("return_delay_time", 250),
+    ("operating_mode", 3),
+    ("secondary_id", 255),
+    ("protocol_type", 2),
+    ("moving_threshold", 10),
+    ("temperature_limit", 80),
+    ("max_voltage_limit", 160),
+    ("min_voltage_limit", 95),
+    ("pwm_limit", 885),
+    ("max_position_limit", 4095),
+    ("shutdown", 52),
+    ("status_return_level", 2),
+    ("present_input_voltage", 120),
+    ("present_temperature", 32),
+];
+
+/// Registers where every device takes other values than the host's table says.
+const RANGES: &[(&str, i64, i64)] = &[
+    // -1, tripped, is the servo's own word.
+    ("bus_watchdog", 0, 127),
+    // What is out of reach depends on the mode and is told as a limit, not as a range.
+    ("goal_position", i32::MIN as i64, i32::MAX as i64),
+];
+
 impl Device {
-    /// All registers: those of the model, and the slots of the indirect blocks.
-    fn cells(&self) -> Vec<Cell> {
-        let slots = |address: u16| self.indirect.iter().any(|block| block.covers(address));
+    /// What a register holds at first; 0 when nothing is said of it.
+    pub(super) fn initial(&self, name: &str) -> i64 {
+        if matches!(
+            name,
+            "goal_position" | "present_position" | "position_trajectory"
+        ) {
+            return i64::from(self.model.centre_pulse);
+        }
+        let own = self.initial.iter().chain(COMMON);
+        let mut named = own.filter(|(known, _)| *known == name);
+        named.next().map_or(0, |(_, value)| *value)
+    }
+
+    /// All registers of a firmware: those of the model, and the slots of the indirect blocks.
+    fn cells(&self, firmware: u8, blocks: &[IndirectBlock]) -> Vec<Cell> {
+        let slots = |address: u16| blocks.iter().any(|block| block.covers(address));
         let plain = self.model.registers.iter();
         let mut cells: Vec<Cell> = plain
             .filter(|register| !slots(register.address))
-            .map(|register| self.cell(*register))
+            .map(|register| self.cell(*register, firmware))
             .collect();
-        let end = end_of(&cells, self.indirect);
-        for block in self.indirect {
+        let end = end_of(&cells, blocks);
+        for block in blocks {
             for slot in 0..block.slots {
                 cells.push(Cell {
                     register: Register {
@@ -100,7 +124,7 @@ impl Device {
                         address: block.address + 2 * slot,
                         size: 2,
                         access: Access::ReadWrite,
-                        min: i64::from(RAM_BEGIN),
+                        min: i64::from(self.model.layout.ram_begin),
                         max: i64::from(end - 1),
                         unit: "",
                     },
@@ -123,16 +147,16 @@ impl Device {
         cells
     }
 
-    fn cell(&self, mut register: Register) -> Cell {
-        let own = self.ranges.iter().find(|(name, ..)| *name == register.name);
-        if let Some(&(_, min, max)) = own {
+    fn cell(&self, mut register: Register, firmware: u8) -> Cell {
+        let ranges = self.ranges.iter().chain(RANGES);
+        let mut own = ranges.filter(|(name, ..)| *name == register.name);
+        if let Some(&(_, min, max)) = own.next() {
             (register.min, register.max) = (min, max);
         }
-        let initial = self.initial.iter().find(|(name, _)| *name == register.name);
         let initial = match register.address {
             address::MODEL_NUMBER => i64::from(self.model.number),
-            address::FIRMWARE_VERSION => i64::from(self.firmware),
-            _ => initial.map_or(0, |(_, value)| *value),
+            address::FIRMWARE_VERSION => i64::from(firmware),
+            _ => self.initial(register.name),
         };
         Cell { register, initial }
     }
@@ -150,9 +174,13 @@ fn end_of(cells: &[Cell], indirect: &[IndirectBlock]) -> u16 {
 }
 
 /// The bytes of one servo's control table.
+///
+/// The servo's own hand ([`get`](Self::get), [`set`](Self::set) and the like) goes by the addresses of the X series, wherever the
+/// model has the register; what comes over the wire goes by the model's own addresses.
 #[derive(Clone, Debug)]
 pub struct ControlTable {
     device: &'static Device,
+    blocks: Vec<IndirectBlock>,
     cells: Vec<Cell>,
     /// Index into `cells` plus one, per byte address; 0 = unmapped.
     map: Vec<u16>,
@@ -160,16 +188,23 @@ pub struct ControlTable {
 }
 
 impl ControlTable {
-    /// A table with every register at its initial value.
+    /// A table of the device's default firmware with every register at its initial value.
     pub fn new(device: &'static Device) -> Self {
-        let cells = device.cells();
-        let end = usize::from(end_of(&cells, device.indirect));
+        Self::with_firmware(device, device.firmware)
+    }
+
+    /// A table of a firmware with every register at its initial value.
+    pub fn with_firmware(device: &'static Device, firmware: u8) -> Self {
+        let blocks: Vec<IndirectBlock> = device.model.indirect(firmware).copied().collect();
+        let cells = device.cells(firmware, &blocks);
+        let end = usize::from(end_of(&cells, &blocks));
         let mut map = vec![0; end];
         for (index, cell) in cells.iter().enumerate() {
             map[cell.span()].fill(index as u16 + 1);
         }
         let mut table = Self {
             device,
+            blocks,
             cells,
             map,
             bytes: vec![0; end],
@@ -178,24 +213,45 @@ impl ControlTable {
         table
     }
 
+    /// The model's own address of an X series register.
+    fn own(&self, x_series: u16) -> u16 {
+        self.device.model.layout.at(x_series)
+    }
+
+    /// The X series address of the register at the model's own `address`. EEPROM beyond the X series' counts as its last byte, so
+    /// that comparing with [`RAM_BEGIN`] tells EEPROM from RAM.
+    pub fn x_series(&self, address: u16) -> u16 {
+        let layout = self.device.model.layout;
+        if layout.is_eeprom(address) {
+            address.min(RAM_BEGIN - 1)
+        } else {
+            layout.x_series(address)
+        }
+    }
+
     /// The device this table belongs to.
     pub fn device(&self) -> &'static Device {
         self.device
     }
 
-    /// Puts every register whose address `which` accepts back to its initial value.
+    /// Puts every register whose X series address `which` accepts back to its initial value.
     pub fn reset(&mut self, which: impl Fn(u16) -> bool) {
         for cell in &self.cells {
-            if which(cell.register.address) {
+            if which(self.x_series(cell.register.address)) {
                 let size = usize::from(cell.register.size);
                 self.bytes[cell.span()].copy_from_slice(&cell.initial.to_le_bytes()[..size]);
             }
         }
     }
 
-    /// The unsigned value of the register at `addr`; 0 when there is none.
+    /// The unsigned value of the register at X series address `addr`; 0 when there is none.
     pub fn get(&self, addr: u16) -> u32 {
-        let Some(cell) = self.cell_at(addr) else {
+        self.value_at(self.own(addr))
+    }
+
+    /// The unsigned value of the register at the model's own address; 0 when there is none.
+    fn value_at(&self, address: u16) -> u32 {
+        let Some(cell) = self.cell_at(address) else {
             return 0;
         };
         let mut value = [0; 4];
@@ -203,28 +259,29 @@ impl ControlTable {
         u32::from_le_bytes(value)
     }
 
-    /// The value of the register at `addr` as a two's complement number of its size.
+    /// The value of the register at X series address `addr` as a two's complement number of its size.
     pub fn get_signed(&self, addr: u16) -> i32 {
         let value = self.get(addr);
-        match self.register_at(addr).map_or(4, |r| r.size) {
+        match self.register_at(self.own(addr)).map_or(4, |r| r.size) {
             1 => i32::from(value as u8 as i8),
             2 => i32::from(value as u16 as i16),
             _ => value as i32,
         }
     }
 
-    /// Sets the register at `addr` without any check: the servo's own hand. No register, no effect.
+    /// Sets the register at X series address `addr` without any check: the servo's own hand. No register, no effect.
     pub fn set(&mut self, addr: u16, value: i64) {
-        if let Some(cell) = self.cell_at(addr) {
+        if let Some(cell) = self.cell_at(self.own(addr)) {
             let (span, size) = (cell.span(), usize::from(cell.register.size));
             self.bytes[span].copy_from_slice(&value.to_le_bytes()[..size]);
         }
     }
 
-    /// Takes over every writable register of `other` whose address `which` accepts.
+    /// Takes over every writable register of `other` whose X series address `which` accepts.
     pub fn copy_from(&mut self, other: &ControlTable, which: impl Fn(u16) -> bool) {
         for cell in &self.cells {
-            if cell.register.access == Access::ReadWrite && which(cell.register.address) {
+            let address = self.x_series(cell.register.address);
+            if cell.register.access == Access::ReadWrite && which(address) {
                 let span = cell.span();
                 if let Some(bytes) = other.bytes.get(span.clone()) {
                     self.bytes[span].copy_from_slice(bytes);
@@ -233,7 +290,7 @@ impl ControlTable {
         }
     }
 
-    /// The register that the byte at `addr` belongs to.
+    /// The register that the byte at the model's own address belongs to.
     pub fn register_at(&self, addr: u16) -> Option<&Register> {
         self.cell_at(addr).map(|cell| &cell.register)
     }
@@ -247,14 +304,10 @@ impl ControlTable {
     ///
     /// A slot that names its own or another slot is plain storage.
     pub fn resolve(&self, addr: u16) -> u16 {
-        for block in self.device.indirect {
-            if (block.data..block.data + block.slots).contains(&addr) {
-                let target = self.get(block.address + 2 * (addr - block.data)) as u16;
-                let is_slot = self
-                    .device
-                    .indirect
-                    .iter()
-                    .any(|b| (b.data..b.data + b.slots).contains(&target));
+        for block in &self.blocks {
+            if let Some(slot) = block.slot(addr) {
+                let target = self.value_at(block.address + 2 * slot) as u16;
+                let is_slot = self.blocks.iter().any(|b| b.slot(target).is_some());
                 return if is_slot { addr } else { target };
             }
         }
@@ -299,7 +352,7 @@ impl ControlTable {
         while at < data.len() {
             let target = self.resolve(addr + at as u16);
             let register = self.register_at(target).ok_or(TableError::Access)?;
-            let locked = torque_on && register.is_eeprom();
+            let locked = torque_on && self.device.model.is_eeprom(register);
             if register.access == Access::Read || locked {
                 return Err(TableError::Access);
             }

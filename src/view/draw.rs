@@ -1,6 +1,7 @@
 //! Draws one cycle: gestures, motion, joints, bus, safety.
 
 use super::watch::{Names, Watch, safety};
+use crate::bus::dynamixel::model::Effort;
 use crate::gesture::{GestureEstimate, GestureKind};
 use crate::live::CycleRecord;
 use crate::puppet::Stage;
@@ -212,6 +213,10 @@ fn joint_lines(names: &Names, record: &CycleRecord, width: u16) -> Vec<Line<'sta
         let mut cells = vec!['·'; track];
         cells[place(state.position, limits)] = '○';
         cells[place(*target, limits)] = '┃';
+        let effort = match names.efforts.get(i) {
+            Some(Effort::Current) => format!("{:+4.1} A", state.effort),
+            Some(Effort::Load) | None => format!("{:+4.0} %", state.effort * 100.0),
+        };
         let silent = record.bus.silent_mask >> i & 1 == 1;
         let alert = record.bus.alert_mask >> i & 1 == 1;
         let note = if silent {
@@ -225,9 +230,8 @@ fn joint_lines(names: &Names, record: &CycleRecord, width: u16) -> Vec<Line<'sta
             Span::from(format!("{id:>3} {name:<18}")),
             Span::from(cells.into_iter().collect::<String>()).light_blue(),
             Span::from(format!(
-                " {target:+6.3} | {:+6.3} rad {:+4.0} %",
-                state.position,
-                state.effort * 100.0
+                " {target:+6.3} | {:+6.3} rad {effort}",
+                state.position
             )),
             note,
         ])

@@ -4,9 +4,11 @@
 #[cfg(feature = "tui")]
 mod draw;
 mod lines;
-pub mod servos;
 #[cfg(feature = "plot")]
 pub mod plot;
+#[cfg(feature = "record")]
+pub mod recorder;
+pub mod servos;
 #[cfg(feature = "tui")]
 mod terminal;
 #[cfg_attr(

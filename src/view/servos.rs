@@ -125,15 +125,16 @@ impl ServoTable {
         let heading = self.columns.iter().enumerate();
         let heading = Row::new(heading.map(|(i, c)| TuiCell::from(aligned(c.name, i))))
             .style(Style::default().add_modifier(Modifier::DIM));
-        let rows = self.rows.iter().map(|row| {
-            let cells = row.iter().enumerate();
-            Row::new(cells.map(|(i, cell)| {
-                TuiCell::from(aligned(&cell.text, i)).style(style(cell.level))
-            }))
-        });
-        let widths = widths.iter().map(|w| {
-            Constraint::Length(u16::try_from(*w).unwrap_or(u16::MAX))
-        });
+        let rows =
+            self.rows.iter().map(|row| {
+                let cells = row.iter().enumerate();
+                Row::new(cells.map(|(i, cell)| {
+                    TuiCell::from(aligned(&cell.text, i)).style(style(cell.level))
+                }))
+            });
+        let widths = widths
+            .iter()
+            .map(|w| Constraint::Length(u16::try_from(*w).unwrap_or(u16::MAX)));
         let table = Table::new(rows, widths)
             .header(heading)
             .column_spacing(2)
@@ -192,13 +193,26 @@ mod tests {
     fn columns_stand_under_their_heading() {
         let table = ServoTable {
             columns: vec![
-                Column { name: "id", right: true },
-                Column { name: "model", right: false },
-                Column { name: "C", right: true },
+                Column {
+                    name: "id",
+                    right: true,
+                },
+                Column {
+                    name: "model",
+                    right: false,
+                },
+                Column {
+                    name: "C",
+                    right: true,
+                },
             ],
             rows: vec![
                 vec![Cell::plain(3), Cell::plain("xl430-w250"), Cell::plain(32)],
-                vec![Cell::plain(120), Cell::plain("ax"), Cell::plain("").at(Level::Bad)],
+                vec![
+                    Cell::plain(120),
+                    Cell::plain("ax"),
+                    Cell::plain("").at(Level::Bad),
+                ],
             ],
             ..ServoTable::default()
         };

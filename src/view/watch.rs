@@ -1,5 +1,6 @@
 //! What a view keeps of the cycles it has seen: names, sums and percentiles.
 
+use crate::bus::dynamixel::model::Effort;
 use crate::config::Character;
 use crate::live::CycleRecord;
 use crate::live::stats::{Microseconds, Percentiles};
@@ -22,6 +23,8 @@ pub struct Names {
     pub clips: Vec<Vec<String>>,
     /// Layers.
     pub layers: Vec<String>,
+    /// What each joint's servo tells of its effort.
+    pub efforts: Vec<Effort>,
     /// Position limits per joint, rad.
     pub limits: Vec<(f64, f64)>,
 }
@@ -47,6 +50,7 @@ impl Names {
             classes: character.classes.iter().map(|c| c.name.clone()).collect(),
             clips: character.classes.iter().map(|c| c.clip_names()).collect(),
             layers: character.layer_names(),
+            efforts: character.servos.iter().map(|s| s.model.effort).collect(),
             limits: character
                 .limits
                 .iter()

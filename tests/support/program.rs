@@ -67,6 +67,8 @@ impl Running {
         let mut child = Command::new(env!("CARGO_BIN_EXE_handwave"))
             .args(args)
             .current_dir(folder)
+            // Runs that fail on purpose must not leave recordings of it about.
+            .env("HANDWAVE_NO_DUMP", "1")
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

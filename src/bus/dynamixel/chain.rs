@@ -4,10 +4,12 @@
 //! `recovery` brings servos back that were silent.
 
 use super::client::{Client, ClientError, Outcome};
+use super::follow::Follower;
+use super::groups::{ReadGroup, goal_registers, read_groups};
 use super::model::{STATE_BYTES, address};
 use super::servo::{ServoSpec, SpecError};
 use crate::base::{JointState, Time};
-use crate::bus::{BusError, CycleReport, ServoBus, TorqueReport};
+use crate::bus::{BusError, CycleReport, ServoBus, ServoFacts, TorqueReport};
 use std::time::Duration;
 
 /// How often a request that brought no answer is repeated outside the control cycle, at least.
@@ -79,8 +81,18 @@ pub(super) struct Servo {
     pub(super) firmware: u8,
     /// Torque was turned on by us and not off again.
     pub(super) armed: bool,
-    /// Last goal sent, in counts; fractions matter while ramping.
+    /// Last position that it was sent to, in counts; fractions matter while ramping.
     pub(super) goal_pulse: f64,
+    /// In this cycle: the goal it is sent, in counts of its mode.
+    pub(super) goal: Option<i32>,
+    /// The host's position loop, for modes in which the servo has none.
+    pub(super) follower: Follower,
+    /// Which of the chain's read groups it is in.
+    pub(super) group: usize,
+    /// Where it was last, in counts; `None` before it was found.
+    pub(super) last_pulse: Option<i32>,
+    /// Counts of its bus watchdog while it is armed; 0 when it has none that helps.
+    pub(super) watchdog: u8,
     /// When a silent servo is asked again.
     pub(super) retry_at: Time,
     /// The time from that to the next try; doubles up to [`ChainOptions::retry_every`].
@@ -110,14 +122,11 @@ pub struct DynamixelChain {
     /// How long a request that brings no answer is repeated at present.
     patience: Duration,
     pub(super) scratch: Scratch,
-    /// Fast reads are in use.
-    pub(super) fast: bool,
-    /// Cycles in a row in which a fast read brought nothing and an ordinary one did.
-    pub(super) fast_failures: u32,
-    /// The last fast read brought nothing, and no ordinary read has got through since.
-    pub(super) fast_in_doubt: bool,
-    /// A fast read has brought states, and none was in doubt since.
-    pub(super) fast_works: bool,
+    /// Servos that are read together.
+    pub(super) groups: Vec<ReadGroup>,
+    /// Goal registers in use: address and bytes.
+    pub(super) goal_registers: Vec<(u16, u8)>,
+    pub(super) facts: Vec<ServoFacts>,
     /// The cycle before brought no answer at all.
     pub(super) was_mute: bool,
     pub(super) last_heard: Time,
@@ -143,12 +152,20 @@ impl DynamixelChain {
         }
         let count = specs.len();
         let now = client.now();
+        let goal_registers = goal_registers(&specs);
+        let (groups, members) = read_groups(&specs);
         Ok(DynamixelChain {
             joints: specs.iter().map(|spec| spec.joint.clone()).collect(),
             servos: specs
                 .into_iter()
-                .map(|spec| Servo {
+                .zip(members)
+                .map(|(spec, group)| Servo {
                     goal_pulse: f64::from(spec.zero_pulse),
+                    goal: None,
+                    follower: Follower::default(),
+                    group,
+                    last_pulse: None,
+                    watchdog: 0,
                     spec,
                     link: Link::Resting,
                     firmware: 0,
@@ -169,20 +186,20 @@ impl DynamixelChain {
                 data: vec![0; count * STATE_BYTES],
                 outcomes: vec![Outcome::NotReached; count],
             },
-            fast: false,
-            fast_failures: 0,
-            fast_in_doubt: false,
-            fast_works: false,
+            groups,
+            goal_registers,
+            facts: Vec::new(),
             was_mute: false,
             last_heard: now,
             last_cycle: None,
         })
     }
 
-    /// Whether the cycle uses fast sync reads. Decided by [`prepare`](ServoBus::prepare): all servos must have a
-    /// firmware that knows them; given up after five cycles in a row in which only an ordinary read got through.
+    /// Whether the cycle uses fast sync reads for all servos. Decided by [`prepare`](ServoBus::prepare) for servos that are
+    /// read together: all must have a firmware that knows them; given up after five cycles in a row in which only an
+    /// ordinary read got through.
     pub fn uses_fast_reads(&self) -> bool {
-        self.fast
+        self.groups.iter().all(|group| group.fast.on)
     }
 
     /// The client below, for its counters.
@@ -253,22 +270,26 @@ impl DynamixelChain {
         }
     }
 
+    /// Reads from an X series address; where the servo's model has it elsewhere, from there.
     pub(super) fn read_register<const N: usize>(
         &mut self,
         index: usize,
         address: u16,
     ) -> Result<[u8; N], BusError> {
         let mut bytes = [0; N];
+        let address = self.servos[index].spec.at(address);
         self.insist(index, |client, id| client.read(id, address, &mut bytes))?;
         Ok(bytes)
     }
 
+    /// Writes to an X series address; where the servo's model has it elsewhere, to there.
     pub(super) fn write_register(
         &mut self,
         index: usize,
         address: u16,
         bytes: &[u8],
     ) -> Result<(), BusError> {
+        let address = self.servos[index].spec.at(address);
         self.insist(index, |client, id| client.write(id, address, bytes))?;
         Ok(())
     }
@@ -323,24 +344,31 @@ impl ServoBus for DynamixelChain {
         let mut reasons: Vec<Option<String>> =
             vec![Some("not asked".to_owned()); self.servos.len()];
         for _ in 0..TRIES {
-            self.scratch.ids.clear();
-            for (servo, reason) in self.servos.iter().zip(&reasons) {
-                if reason.is_some() {
-                    self.scratch.ids.push(servo.spec.id);
-                }
-            }
-            if self.scratch.ids.is_empty() {
+            if reasons.iter().all(Option::is_none) {
                 break;
             }
-            // One byte of zero each: torque off, then the watchdog, which has nothing left to guard.
-            let zeros = vec![0; self.scratch.ids.len()];
-            for register in [address::TORQUE_ENABLE, address::BUS_WATCHDOG] {
-                let sent = self
-                    .client
-                    .sync_write(register, 1, &self.scratch.ids, &zeros);
-                // Sync writes are not answered: nothing else than a lost port can be learnt here.
-                if let Err(ClientError::Port(error)) = sent {
-                    return Err(error.into());
+            // Servos whose registers lie elsewhere are other groups.
+            for group in 0..self.groups.len() {
+                let mut layout = None;
+                self.scratch.ids.clear();
+                for (servo, reason) in self.servos.iter().zip(&reasons) {
+                    if reason.is_some() && servo.group == group {
+                        self.scratch.ids.push(servo.spec.id);
+                        layout = Some(servo.spec.model.layout);
+                    }
+                }
+                let Some(layout) = layout else { continue };
+                // One byte of zero each: torque off, then the watchdog, which has nothing left to guard.
+                let zeros = vec![0; self.scratch.ids.len()];
+                for register in [address::TORQUE_ENABLE, address::BUS_WATCHDOG] {
+                    let register = layout.at(register);
+                    let sent = self
+                        .client
+                        .sync_write(register, 1, &self.scratch.ids, &zeros);
+                    // Sync writes are not answered: nothing else than a lost port can be learnt here.
+                    if let Err(ClientError::Port(error)) = sent {
+                        return Err(error.into());
+                    }
                 }
             }
             for (servo, reason) in self.servos.iter_mut().zip(&mut reasons) {
@@ -348,9 +376,8 @@ impl ServoBus for DynamixelChain {
                     continue;
                 }
                 let mut torque = [1];
-                let answer = self
-                    .client
-                    .read(servo.spec.id, address::TORQUE_ENABLE, &mut torque);
+                let register = servo.spec.at(address::TORQUE_ENABLE);
+                let answer = self.client.read(servo.spec.id, register, &mut torque);
                 *reason = match answer {
                     Ok(_) if torque == [0] => None,
                     Ok(_) => Some("its torque stays on".into()),
@@ -400,6 +427,10 @@ impl ServoBus for DynamixelChain {
         servo.retry_after = self.options.retry_every;
         servo.retry_at = now + servo.retry_after;
         Ok(())
+    }
+
+    fn facts(&self) -> &[ServoFacts] {
+        &self.facts
     }
 
     fn notes(&self) -> &[String] {

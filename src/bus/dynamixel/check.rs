@@ -1,8 +1,10 @@
 //! What is looked at before a servo may move, and the way to torque.
 
-use super::chain::{DynamixelChain, Link};
+use super::chain::{DynamixelChain, Link, Servo};
 use super::client::ClientError;
-use super::model::{Model, POSITION_MODE, STATE_BYTES, address, hardware_error};
+use super::goals::resting_goal;
+use super::groups::FastReads;
+use super::model::{Mode, Model, STATE_BYTES, address, hardware_error};
 use super::servo::position_pulse;
 use crate::base::JointState;
 use crate::bus::BusError;
@@ -17,6 +19,7 @@ impl DynamixelChain {
     /// Looks at every servo and reads all present states; changes no torque and no EEPROM.
     pub(super) fn check_all(&mut self, states: &mut [JointState]) -> Result<(), BusError> {
         self.notes.clear();
+        self.facts.clear();
         let mut return_delay = 0;
         let mut slow = 0;
         for (index, state) in (0..self.servos.len()).zip(states) {
@@ -35,24 +38,31 @@ impl DynamixelChain {
                 self.options.bus
             ));
         }
-        self.fast = self
-            .servos
-            .iter()
-            .all(|servo| servo.firmware >= servo.spec.model.fast_reads_since);
-        if let Some(old) = self
-            .servos
-            .iter()
-            .find(|servo| servo.firmware < servo.spec.model.fast_reads_since)
-        {
-            self.notes.push(format!(
-                "servo {} has firmware {}, fast reads need {}: ordinary sync reads are used",
-                old.spec.id, old.firmware, old.spec.model.fast_reads_since
-            ));
-        }
-        self.fast_failures = 0;
-        self.fast_in_doubt = false;
-        self.fast_works = false;
+        self.choose_reads();
         Ok(())
+    }
+
+    /// Fast reads for servos that are read together and all know them.
+    fn choose_reads(&mut self) {
+        for (group, reads) in self.groups.iter_mut().enumerate() {
+            let old = self.servos.iter().find(|servo| {
+                servo.group == group && servo.firmware < servo.spec.model.fast_reads_since
+            });
+            reads.fast = FastReads::new(old.is_none());
+            let Some(old) = old else { continue };
+            let (id, model) = (old.spec.id, old.spec.model);
+            self.notes.push(if model.fast_reads_since == u8::MAX {
+                format!(
+                    "servo {id} is an {}, which knows no fast reads: ordinary sync reads are used",
+                    model.name
+                )
+            } else {
+                format!(
+                    "servo {id} has firmware {}, fast reads need {}: ordinary sync reads are used",
+                    old.firmware, model.fast_reads_since
+                )
+            });
+        }
     }
 
     /// Checks one servo and returns its return delay register.
@@ -81,12 +91,17 @@ impl DynamixelChain {
             return Err(self.hardware_error(index, errors));
         }
         let [delay, drive_mode, mode] = self.read_register(index, address::RETURN_DELAY_TIME)?;
-        if mode != POSITION_MODE {
+        let wanted = spec.mode.number();
+        if mode != wanted {
             return Err(self.servo_problem(
                 index,
-                format!("operating mode is {mode}, needed is {POSITION_MODE} (position)"),
                 format!(
-                    "With torque off set it by `handwave bus write {bus} {id} operating_mode {POSITION_MODE}`"
+                    "operating mode is {mode}{}, needed is {wanted} ({})",
+                    Mode::from_number(mode).map_or(String::new(), |mode| format!(" ({})", mode.name())),
+                    spec.mode.name()
+                ),
+                format!(
+                    "With torque off set it by `handwave bus write {bus} {id} operating_mode {wanted}`"
                 ),
             ));
         }
@@ -108,7 +123,10 @@ impl DynamixelChain {
                 "servo {id} turns torque on by itself when it gets a goal (drive_mode bit 3)"
             ));
         }
-        self.check_limits(index)?;
+        if spec.mode.has_position_limits() {
+            self.check_limits(index)?;
+        }
+        self.look_at(index)?;
         let [watchdog] = self.read_register(index, address::BUS_WATCHDOG)?;
         if watchdog != 0 {
             // Left running or tripped by whoever used the chain before; tripped, it refuses goals.
@@ -120,6 +138,7 @@ impl DynamixelChain {
         self.check_position(index, pulse)?;
         let servo = &mut self.servos[index];
         servo.goal_pulse = f64::from(pulse);
+        servo.last_pulse = Some(pulse);
         servo.link = Link::Resting;
         *state = servo.spec.state(&registers, self.client.now());
         Ok(delay)
@@ -129,10 +148,8 @@ impl DynamixelChain {
     fn ensure_answers(&mut self, index: usize) -> Result<(), BusError> {
         let id = self.servos[index].spec.id;
         let mut level = [0];
-        match self
-            .client
-            .read(id, address::STATUS_RETURN_LEVEL, &mut level)
-        {
+        let register = self.servos[index].spec.at(address::STATUS_RETURN_LEVEL);
+        match self.client.read(id, register, &mut level) {
             Ok(_) if level == [2] => return Ok(()),
             // At level 0 not even a read is answered, though the ping was.
             Ok(_) | Err(ClientError::Timeout { .. }) => {}
@@ -140,7 +157,7 @@ impl DynamixelChain {
         }
         // A sync write never expects an answer.
         self.client
-            .sync_write(address::STATUS_RETURN_LEVEL, 1, &[id], &[2])
+            .sync_write(register, 1, &[id], &[2])
             .map_err(|error| self.servo_error(index, error))?;
         let [level] = self.read_register(index, address::STATUS_RETURN_LEVEL)?;
         if level != 2 {
@@ -180,22 +197,41 @@ impl DynamixelChain {
         ))
     }
 
+    /// Whether `pulse` is where the servo may stand: in its declared range, and within half a turn of where it was last, if it
+    /// may make several.
     fn check_position(&self, index: usize, pulse: i32) -> Result<(), BusError> {
-        let spec = &self.servos[index].spec;
-        if spec.contains(pulse) {
+        let Servo {
+            spec, last_pulse, ..
+        } = &self.servos[index];
+        if !spec.contains(pulse) {
+            return Err(self.servo_problem(
+                index,
+                format!(
+                    "it stands at {pulse} ({:.1} deg), outside its declared range {} to {}",
+                    spec.position_rad(pulse).to_degrees(),
+                    spec.min_pulse,
+                    spec.max_pulse
+                ),
+                "Turn the joint into its range by hand (torque is off), \
+                 or check zero, direction and range in the configuration"
+                    .into(),
+            ));
+        }
+        let turn = spec.model.pulses_per_turn as i32;
+        let Some(last) = last_pulse.filter(|_| spec.max_pulse - spec.min_pulse >= turn) else {
+            return Ok(());
+        };
+        if pulse.abs_diff(last) <= turn.unsigned_abs() / 2 {
             return Ok(());
         }
+        // After a reboot or without power a servo counts from within one turn again.
         Err(self.servo_problem(
             index,
             format!(
-                "it stands at {pulse} ({:.1} deg), outside its declared range {} to {}",
-                spec.position_rad(pulse).to_degrees(),
-                spec.min_pulse,
-                spec.max_pulse
+                "it tells {pulse} and told {last} before: a joint of several turns has lost count of them, \
+                 or was turned by more than half a turn"
             ),
-            "Turn the joint into its range by hand (torque is off), \
-             or check zero, direction and range in the configuration"
-                .into(),
+            "Turn it by hand (torque is off) into the turn that its count means, then start again".into(),
         ))
     }
 
@@ -229,13 +265,11 @@ impl DynamixelChain {
         }
         // A tripped watchdog refuses goals.
         self.write_register(index, address::BUS_WATCHDOG, &[0])?;
-        let mut profile = [0; 8];
-        profile[..4].copy_from_slice(&self.options.profile_acceleration.to_le_bytes());
-        profile[4..].copy_from_slice(&self.options.profile_velocity.to_le_bytes());
-        self.write_register(index, address::PROFILE_ACCELERATION, &profile)?;
+        self.write_settings(index)?;
         let pulse = i32::from_le_bytes(self.read_register(index, address::PRESENT_POSITION)?);
         self.check_position(index, pulse)?;
-        self.write_register(index, address::GOAL_POSITION, &pulse.to_le_bytes())?;
+        let (goal, bytes, size) = resting_goal(&self.servos[index].spec, pulse);
+        self.insist(index, |client, id| client.write(id, goal, &bytes[..size]))?;
         // From here on torque may be on, whatever the answers say.
         self.servos[index].armed = true;
         self.write_register(index, address::TORQUE_ENABLE, &[1])?;
@@ -252,17 +286,46 @@ impl DynamixelChain {
         }
         let servo = &mut self.servos[index];
         servo.goal_pulse = f64::from(pulse);
+        servo.last_pulse = Some(pulse);
+        servo.follower.restart();
         servo.link = Link::Driven;
+        Ok(())
+    }
+
+    /// Profile, gains and current limit: RAM that a reboot or a change of mode has put back.
+    fn write_settings(&mut self, index: usize) -> Result<(), BusError> {
+        let spec = &self.servos[index].spec;
+        let (acceleration, velocity) = match &spec.settings.profile {
+            Some(profile) => profile.counts(spec.model),
+            None => (
+                self.options.profile_acceleration,
+                self.options.profile_velocity,
+            ),
+        };
+        let gains = spec.settings.gains.registers();
+        let limit = self.servos[index].follower.limit;
+        let limits_current = spec.mode == Mode::CurrentBasedPosition;
+        let mut profile = [0; 8];
+        profile[..4].copy_from_slice(&acceleration.to_le_bytes());
+        profile[4..].copy_from_slice(&velocity.to_le_bytes());
+        self.write_register(index, address::PROFILE_ACCELERATION, &profile)?;
+        for (_, register, value) in gains {
+            if let Some(value) = value {
+                self.write_register(index, register, &value.to_le_bytes())?;
+            }
+        }
+        if limits_current {
+            // In this mode the goal current is the most that it uses, either way.
+            let counts = limit.clamp(0, i32::from(i16::MAX)) as u16;
+            self.write_register(index, address::GOAL_CURRENT, &counts.to_le_bytes())?;
+        }
         Ok(())
     }
 
     /// Starts the watchdog of one servo where it is wanted and there is one. Only with torque on: it counts then only.
     pub(super) fn start_watchdog(&mut self, index: usize) -> Result<(), BusError> {
-        let servo = &self.servos[index];
-        let known = servo.firmware >= servo.spec.model.watchdog_since;
-        // The register is signed; -1 means tripped.
-        let counts = self.options.watchdog.min(127);
-        if counts == 0 || !known {
+        let counts = self.servos[index].watchdog;
+        if counts == 0 {
             return Ok(());
         }
         self.write_register(index, address::BUS_WATCHDOG, &[counts])

@@ -2,15 +2,13 @@
 
 use super::chain::{DynamixelChain, Link};
 use super::client::{ClientError, Outcome};
-use super::model::{STATE_BYTES, address};
+use super::model::STATE_BYTES;
+use super::servo::position_pulse;
 use crate::base::{JointState, Time};
 use crate::bus::{BusError, CycleReport};
 use handwave_dynamixel::wire;
-use std::f64::consts::TAU;
 use std::time::Duration;
 
-/// Cycles in a row after which fast reads are given up.
-const FAST_FAILURES: u32 = 5;
 /// How often servos are asked in one cycle: at first, and again for what damage or silence took along.
 const MAX_ROUNDS: u32 = 3;
 /// The longest step of time that moves a ramped goal.
@@ -48,10 +46,8 @@ impl DynamixelChain {
         }
         self.last_cycle = Some(begin);
 
-        self.send_goals(targets_rad, step.as_secs_f64())?;
+        self.send_goals(targets_rad, states, step.as_secs_f64())?;
         report.goal_sent_us = micros(self.client.now().saturating_since(begin));
-        self.client
-            .set_cycle_end(Some(begin + self.options.cycle_budget));
         let read = self.read_states(states, &mut report, begin);
         self.client.set_cycle_end(None);
         read?;
@@ -85,99 +81,23 @@ impl DynamixelChain {
         Ok(report)
     }
 
-    /// Sends the goals of all servos that are driven.
-    fn send_goals(&mut self, targets_rad: &[f64], step_s: f64) -> Result<(), BusError> {
-        let scratch = &mut self.scratch;
-        scratch.ids.clear();
-        let mut filled = 0;
-        for (servo, &target_rad) in self.servos.iter_mut().zip(targets_rad) {
-            if !matches!(servo.link, Link::Driven | Link::Ramping) {
-                continue;
-            }
-            // Not a number: the last goal stands.
-            let wanted = servo
-                .spec
-                .goal_pulse(target_rad)
-                .map_or(servo.goal_pulse, f64::from);
-            servo.goal_pulse = if servo.link == Link::Ramping {
-                let rate = self.options.reentry_rate_rad_s * servo.spec.model.pulses_per_turn / TAU;
-                let reach = rate.max(0.0) * step_s;
-                let left = wanted - servo.goal_pulse;
-                if left.abs() <= reach {
-                    servo.link = Link::Driven;
-                    wanted
-                } else {
-                    servo.goal_pulse + reach.copysign(left)
-                }
-            } else {
-                wanted
-            };
-            let pulse =
-                (servo.goal_pulse.round() as i32).clamp(servo.spec.min_pulse, servo.spec.max_pulse);
-            scratch.ids.push(servo.spec.id);
-            scratch.data[filled..filled + 4].copy_from_slice(&pulse.to_le_bytes());
-            filled += 4;
-        }
-        if scratch.ids.is_empty() {
-            return Ok(());
-        }
-        self.client
-            .sync_write(
-                address::GOAL_POSITION,
-                4,
-                &scratch.ids,
-                &scratch.data[..filled],
-            )
-            .map_err(port_error)
-    }
-
-    /// Reads all servos that are not silent; asks again for what a silent or damaged one took with it.
+    /// Reads all servos that are not silent, group by group; asks again for what a silent or damaged one took with it.
     fn read_states(
         &mut self,
         states: &mut [JointState],
         report: &mut CycleReport,
         begin: Time,
     ) -> Result<(), BusError> {
-        self.scratch.ids.clear();
-        self.scratch.indices.clear();
-        for (index, servo) in self.servos.iter().enumerate() {
-            if servo.link != Link::Silent {
-                self.scratch.ids.push(servo.spec.id);
-                self.scratch.indices.push(index);
-            }
-        }
         for servo in &mut self.servos {
             (servo.fresh, servo.mute) = (false, false);
         }
-        // While fast reads are in doubt, an ordinary one shows who is to blame: they or the line.
-        let mut fast = self.fast && !self.fast_in_doubt;
-        let mut fast_was_mute = false;
-        let mut asked_ordinary = false;
-        for round in 0..MAX_ROUNDS {
-            let count = self.scratch.ids.len();
-            let answer = if fast {
-                wire::fast_status(count, STATE_BYTES)
-            } else {
-                count * wire::status(STATE_BYTES)
-            };
-            let needed = wire::duration(wire::sync_read(count) + answer, self.client.baud());
-            let spent = self.client.now().saturating_since(begin);
-            let room = spent + needed <= self.options.cycle_budget;
-            if count == 0 || (round > 0 && !room) {
-                break;
-            }
-            self.read_listed(fast)?;
-            self.take_states(states, report);
-            asked_ordinary |= !fast;
-            self.fast_works |= fast && report.fresh > 0;
-            if fast && report.fresh == 0 && self.servos.iter().any(|servo| servo.mute) {
-                // Not even the first servo spoke. If fast reads have worked so far, it is silent; else an
-                // ordinary read shows whether they are not understood.
-                fast_was_mute = true;
-                fast = self.fast_works;
-            }
+        let end = begin + self.options.cycle_budget;
+        for group in 0..self.groups.len() {
+            // The groups behind have their turn in the same cycle.
+            let behind = self.read_time_behind(group);
+            self.client.set_cycle_end(Some(end - behind));
+            self.read_group(group, states, report, begin + behind)?;
         }
-        self.judge_fast_reads(fast_was_mute, asked_ordinary, report.fresh);
         self.leave_out_mute(report.fresh);
         for (index, servo) in self.servos.iter().enumerate() {
             if !servo.fresh {
@@ -188,12 +108,82 @@ impl DynamixelChain {
         Ok(())
     }
 
-    fn read_listed(&mut self, fast: bool) -> Result<(), BusError> {
+    /// Wire time of reading the groups behind `group`, once each.
+    fn read_time_behind(&self, group: usize) -> Duration {
+        let bytes = (group + 1..self.groups.len()).map(|group| {
+            let members = self
+                .servos
+                .iter()
+                .filter(|servo| servo.group == group && servo.link != Link::Silent);
+            let count = members.count();
+            wire::sync_read(count) + self.answer_bytes(count, self.groups[group].fast.first())
+        });
+        wire::duration(bytes.sum(), self.client.baud())
+    }
+
+    fn answer_bytes(&self, servos: usize, fast: bool) -> usize {
+        if fast {
+            wire::fast_status(servos, STATE_BYTES)
+        } else {
+            servos * wire::status(STATE_BYTES)
+        }
+    }
+
+    /// Reads one group in a cycle of which as much time counts as spent as has passed since `begin`.
+    fn read_group(
+        &mut self,
+        group: usize,
+        states: &mut [JointState],
+        report: &mut CycleReport,
+        begin: Time,
+    ) -> Result<(), BusError> {
+        self.scratch.ids.clear();
+        self.scratch.indices.clear();
+        for (index, servo) in self.servos.iter().enumerate() {
+            if servo.link != Link::Silent && servo.group == group {
+                self.scratch.ids.push(servo.spec.id);
+                self.scratch.indices.push(index);
+            }
+        }
+        let fresh_before = report.fresh;
+        let mut fast = self.groups[group].fast.first();
+        let mut fast_was_mute = false;
+        let mut asked_ordinary = false;
+        for round in 0..MAX_ROUNDS {
+            let count = self.scratch.ids.len();
+            let answer = self.answer_bytes(count, fast);
+            let needed = wire::duration(wire::sync_read(count) + answer, self.client.baud());
+            let spent = self.client.now().saturating_since(begin);
+            let room = spent + needed <= self.options.cycle_budget;
+            if count == 0 || (round > 0 && !room) {
+                break;
+            }
+            self.read_listed(self.groups[group].address, fast)?;
+            self.take_states(states, report);
+            asked_ordinary |= !fast;
+            let fresh = report.fresh - fresh_before;
+            let reads = &mut self.groups[group].fast;
+            reads.works |= fast && fresh > 0;
+            let mut members = self.servos.iter().filter(|servo| servo.group == group);
+            if fast && fresh == 0 && members.any(|servo| servo.mute) {
+                // Not even the first servo spoke. If fast reads have worked so far, it is silent; else an
+                // ordinary read shows whether they are not understood.
+                fast_was_mute = true;
+                fast = reads.works;
+            }
+        }
+        let fresh = report.fresh - fresh_before;
+        let reads = &mut self.groups[group].fast;
+        reads.judge(fast_was_mute, asked_ordinary, fresh);
+        Ok(())
+    }
+
+    fn read_listed(&mut self, address: u16, fast: bool) -> Result<(), BusError> {
         let count = self.scratch.ids.len();
         let scratch = &mut self.scratch;
         let data = &mut scratch.data[..count * STATE_BYTES];
         let outcomes = &mut scratch.outcomes[..count];
-        let (address, length) = (address::PRESENT_STATE, STATE_BYTES as u16);
+        let length = STATE_BYTES as u16;
         let read = if fast {
             self.client
                 .fast_sync_read(address, length, &scratch.ids, data, outcomes)
@@ -219,6 +209,7 @@ impl DynamixelChain {
                         .zip(states.get_mut(index))
                     {
                         *state = self.servos[index].spec.state(registers, now);
+                        self.servos[index].last_pulse = Some(position_pulse(registers));
                     }
                     self.servos[index].fresh = true;
                     report.fresh = report.fresh.saturating_add(1);
@@ -240,23 +231,6 @@ impl DynamixelChain {
         scratch.indices.truncate(kept);
     }
 
-    /// Gives fast reads up when time and again only ordinary reads get through.
-    fn judge_fast_reads(&mut self, fast_was_mute: bool, asked_ordinary: bool, fresh: u16) {
-        if !self.fast {
-            return;
-        }
-        let ordinary_got_through =
-            fresh > 0 && asked_ordinary && (fast_was_mute || self.fast_in_doubt);
-        if ordinary_got_through {
-            self.fast_works = false;
-            self.fast_failures += 1;
-            self.fast = self.fast_failures < FAST_FAILURES;
-        } else if fresh > 0 {
-            self.fast_failures = 0;
-        }
-        self.fast_in_doubt = fresh == 0 && (fast_was_mute || self.fast_in_doubt);
-    }
-
     /// Takes servos that were mute out of the following cycles.
     ///
     /// If nobody at all answered, the line may have hiccuped: then only in the second such cycle.
@@ -275,7 +249,7 @@ impl DynamixelChain {
 }
 
 /// In the cycle the only failure of a request to many is the port's.
-fn port_error(error: ClientError) -> BusError {
+pub(super) fn port_error(error: ClientError) -> BusError {
     match error {
         ClientError::Port(error) => BusError::Port(error),
         other => BusError::Servo {

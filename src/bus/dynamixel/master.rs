@@ -45,6 +45,15 @@ impl Default for MasterOptions {
     }
 }
 
+impl MasterOptions {
+    /// The default, with patience for an adapter that keeps bytes back.
+    pub fn of(port: &dyn Port) -> Self {
+        let mut options = Self::default();
+        options.max_allowance += port.latency_timer().unwrap_or_default();
+        options
+    }
+}
+
 /// Left of a control cycle after the servos behind a silent one were asked again.
 const SPARE_MARGIN: Duration = Duration::from_micros(300);
 

@@ -12,13 +12,18 @@ pub mod chain;
 mod check;
 pub mod client;
 mod cycle;
+mod facts;
+mod follow;
+mod goals;
 mod group_read;
+mod groups;
 pub mod master;
 pub mod model;
 mod recovery;
 #[cfg(test)]
 mod scripted;
 pub mod servo;
+pub mod settings;
 pub mod setup;
 #[cfg(test)]
 mod tests;
@@ -29,8 +34,9 @@ pub use backend_dynamixel2::Dynamixel2Client;
 pub use chain::{ChainOptions, DynamixelChain};
 pub use client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
 pub use master::{Master, MasterOptions};
-pub use model::{Model, Protocol, Register};
+pub use model::{Mode, Model, Protocol, Register};
 pub use servo::{Direction, ServoSpec, SpecError};
+pub use settings::{Follow, Gains, Profile, Settings};
 
 use super::address::DynamixelBackend;
 use super::port::{PortError, WrapPort};
@@ -53,9 +59,8 @@ pub fn open(
     match backend {
         DynamixelBackend::Handwave => {
             let port = SerialPort::open(path, baud, clock)?;
-            let mut options = MasterOptions::default();
-            options.max_allowance += port.latency_timer().unwrap_or_default();
             let port = wrap(&format!("dynamixel:{path}@{baud}"), Box::new(port));
+            let options = MasterOptions::of(port.as_ref());
             Ok(Box::new(Master::new(port, options)))
         }
         #[cfg(feature = "dxl-serial2")]

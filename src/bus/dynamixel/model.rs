@@ -1,23 +1,43 @@
-//! Servo models as data: model number, registers, units.
+//! Servo models as data: model number, registers, units, modes.
 //!
-//! Facts from the vendor's e-manual, control table of XL430-W250. A new model is a new table.
+//! Facts from the vendor's model files (`tables`, held by a test) and, for ranges, firmware and modes, its e-Manual. A new
+//! model is an entry in the catalogue and, where its registers differ, a table.
 
 pub mod address;
+mod catalogue;
+mod current;
+mod layout;
+mod mode;
+mod ph42;
+mod table;
+#[cfg(test)]
+mod vendor;
+mod x330;
 mod x430;
+
+pub use catalogue::XL430_W250;
+pub use layout::{IndirectBlock, Layout};
+pub use mode::{MODES, Mode};
 
 use std::f64::consts::TAU;
 
-/// Bytes from [`address::PRESENT_STATE`]: load, velocity, position.
+/// Bytes from [`address::PRESENT_STATE`]: load or current, velocity, position.
 pub const STATE_BYTES: usize = 10;
-/// Where EEPROM ends and RAM begins. EEPROM can be written only while torque is off.
+/// Where EEPROM ends and RAM begins on X series servos. EEPROM can be written only while torque is off.
 pub const RAM_BEGIN: u16 = 64;
 /// Operating mode: position control within one turn.
-pub const POSITION_MODE: u8 = 3;
+pub const POSITION_MODE: u8 = Mode::Position.number();
+/// One count of the bus watchdog, milliseconds.
+pub const WATCHDOG_UNIT_MS: u64 = 20;
+/// How many turns either way a goal may be in modes of several turns.
+pub const TURNS_EITHER_WAY: i32 = 256;
 
 /// Position counts of a whole turn.
 pub const PULSES_PER_TURN: f64 = 4096.0;
 /// One count of velocity, 0.229 rev/min, in rad/s.
 pub const VELOCITY_UNIT_RAD_S: f64 = 0.229 * TAU / 60.0;
+/// One count of profile acceleration, 214.577 rev/min2, in rad/s2.
+pub const ACCELERATION_UNIT_RAD_S2: f64 = 214.577 * TAU / 3600.0;
 
 /// Bits of the hardware error status (register 70).
 pub mod hardware_error {
@@ -71,9 +91,10 @@ pub struct Register {
 }
 
 impl Register {
-    /// Whether the register keeps its value without power and is locked while torque is on.
+    /// Whether the register keeps its value without power and is locked while torque is on, on X series servos;
+    /// [`Model::is_eeprom`] knows the others.
     pub const fn is_eeprom(&self) -> bool {
-        self.address < RAM_BEGIN
+        Layout::X.is_eeprom(self.address)
     }
 
     /// The value in `bytes`, of which there are [`size`](Self::size), low byte first.
@@ -107,40 +128,74 @@ pub enum Protocol {
     Two,
 }
 
+/// What a servo tells of its effort (register 126), and with that what [`JointState::effort`](crate::base::JointState::effort) is.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// Share of its greatest torque, -1..1, estimated by the servo. No current can be set.
+    #[default]
+    Load,
+    /// Measured current, in ampere.
+    Current,
+}
+
+impl Effort {
+    /// The unit, for the reader.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Effort::Load => "share of the greatest load",
+            Effort::Current => "A",
+        }
+    }
+}
+
 /// A servo model.
 #[derive(Debug, PartialEq)]
 pub struct Model {
     /// The protocol that it speaks out of the box.
     pub protocol: Protocol,
-    /// Name as in the vendor's catalogue, lower case, such as `xl430-w250`.
+    /// Name as in the vendor's catalogue, lower case, such as `xl430-w250`; MX servos with Protocol 2.0 end in `-2`.
     pub name: &'static str,
     /// Model number (register 0).
     pub number: u16,
-    /// Firmware from which on fast reads are understood.
+    /// Firmware from which on fast reads are understood; 255 when none does.
     pub fast_reads_since: u8,
     /// Firmware from which on there is a bus watchdog.
     pub watchdog_since: u8,
     /// Position counts of a whole turn.
     pub pulses_per_turn: f64,
+    /// Count in the middle of the turn.
+    pub centre_pulse: i32,
     /// One count of velocity, in rad/s.
     pub velocity_unit_rad_s: f64,
+    /// One count of profile acceleration, in rad/s2.
+    pub acceleration_unit_rad_s2: f64,
+    /// What it tells of its effort.
+    pub effort: Effort,
     /// One count of load or current, in the unit of [`JointState::effort`](crate::base::JointState::effort).
     pub effort_unit: f64,
-    /// Control table, by address.
+    /// Operating modes that it has.
+    pub modes: &'static [Mode],
+    /// Where its registers lie.
+    pub layout: Layout,
+    /// Indirect blocks of all firmwares; see [`Model::indirect`].
+    pub indirect: &'static [IndirectBlock],
+    /// Why its bus watchdog cannot be relied upon, as a sentence; `None` when it can.
+    pub watchdog_defect: Option<&'static str>,
+    /// Control table, by address. The indirect blocks are there by their first address register.
     pub registers: &'static [Register],
 }
 
 impl Model {
     /// The model with this number.
     pub fn by_number(number: u16) -> Option<&'static Model> {
-        MODELS.into_iter().find(|model| model.number == number)
+        let mut models = MODELS.iter().copied();
+        models.find(|model| model.number == number)
     }
 
     /// The model with this name.
     pub fn by_name(name: &str) -> Option<&'static Model> {
-        MODELS
-            .into_iter()
-            .find(|model| model.name.eq_ignore_ascii_case(name))
+        let mut models = MODELS.iter().copied();
+        models.find(|model| model.name.eq_ignore_ascii_case(name))
     }
 
     /// The register with this name.
@@ -154,23 +209,59 @@ impl Model {
             .iter()
             .find(|register| register.address == address)
     }
+
+    /// Whether a register keeps its value without power and is locked while torque is on.
+    pub const fn is_eeprom(&self, register: &Register) -> bool {
+        self.layout.is_eeprom(register.address)
+    }
+
+    /// The indirect blocks that a servo with this firmware has. On servos of the 330 size they moved with firmware 52.
+    pub fn indirect(&self, firmware: u8) -> impl Iterator<Item = &'static IndirectBlock> + use<> {
+        let blocks = self.indirect.iter();
+        blocks.filter(move |block| block.is_in(firmware))
+    }
+
+    /// Radians of one position count.
+    pub fn pulse_rad(&self) -> f64 {
+        TAU / self.pulses_per_turn
+    }
+
+    /// Least and greatest count that a goal can have in a mode: one turn, or many.
+    pub fn goal_range(&self, mode: Mode) -> (i32, i32) {
+        let turn = self.pulses_per_turn as i32;
+        if mode.has_position_limits() {
+            match self.register("max_position_limit") {
+                Some(limit) => (limit.min as i32, limit.max as i32),
+                None => (0, turn - 1),
+            }
+        } else {
+            let many = TURNS_EITHER_WAY * turn - 1;
+            (-many, many)
+        }
+    }
 }
 
 /// All models known.
-pub static MODELS: [&Model; 1] = [&XL430_W250];
-
-/// XL430-W250: the servo of small walking robots. Reports load, not current.
-pub static XL430_W250: Model = Model {
-    protocol: Protocol::Two,
-    name: "xl430-w250",
-    number: 1060,
-    fast_reads_since: 45,
-    watchdog_since: 38,
-    pulses_per_turn: PULSES_PER_TURN,
-    velocity_unit_rad_s: VELOCITY_UNIT_RAD_S,
-    effort_unit: 0.001,
-    registers: &x430::REGISTERS,
-};
+pub static MODELS: &[&Model] = &[
+    &XL430_W250,
+    &catalogue::XC430_W150,
+    &catalogue::XC430_W240,
+    &catalogue::XM430_W210,
+    &catalogue::XM430_W350,
+    &catalogue::XH430_W350,
+    &catalogue::XM540_W150,
+    &catalogue::XM540_W270,
+    &catalogue::XL330_M077,
+    &catalogue::XL330_M288,
+    &catalogue::XC330_T181,
+    &catalogue::XC330_T288,
+    &catalogue::XC330_M181,
+    &catalogue::XC330_M288,
+    &catalogue::MX_28,
+    &catalogue::MX_64,
+    &catalogue::MX_106,
+    &catalogue::PH42_020_S300,
+];
 
 #[cfg(test)]
 mod tests {
@@ -183,7 +274,8 @@ mod tests {
                 let end = pair[0].address + u16::from(pair[0].size);
                 assert!(
                     end <= pair[1].address,
-                    "{} reaches into {}",
+                    "{}: {} reaches into {}",
+                    model.name,
                     pair[0].name,
                     pair[1].name
                 );
@@ -193,15 +285,96 @@ mod tests {
 
     #[test]
     fn values_survive_their_bytes() {
-        let model = Model::by_number(1060).expect("XL430-W250 is known");
-        for register in model.registers {
-            for value in [register.min, 0, register.max] {
-                let bytes = register.encode(value);
-                let found = register.decode(&bytes[..usize::from(register.size)]);
-                assert_eq!(found, value, "{}", register.name);
+        for model in MODELS {
+            for register in model.registers {
+                for value in [register.min, 0.max(register.min), register.max] {
+                    let bytes = register.encode(value);
+                    let found = register.decode(&bytes[..usize::from(register.size)]);
+                    assert_eq!(found, value, "{} of {}", register.name, model.name);
+                }
             }
         }
+        let model = Model::by_number(1060).expect("XL430-W250 is known");
         let watchdog = model.register("bus_watchdog").expect("it has one");
         assert_eq!(watchdog.decode(&[0xFF]), -1, "a tripped watchdog");
+    }
+
+    #[test]
+    fn numbers_and_names_belong_to_one_model() {
+        for (index, model) in MODELS.iter().enumerate() {
+            for other in &MODELS[..index] {
+                assert_ne!(model.number, other.number, "{}", model.name);
+                assert_ne!(model.name, other.name);
+            }
+            let limit = model.register("current_limit").is_some();
+            assert_eq!(limit, model.effort == Effort::Current, "{}", model.name);
+            for mode in model.modes {
+                let (goal, _) = mode.goal();
+                let register = model.register_at(model.layout.at(goal));
+                assert!(register.is_some(), "{}: no goal for {mode:?}", model.name);
+                assert!(limit || !mode.uses_current(), "{}: {mode:?}", model.name);
+            }
+        }
+    }
+
+    #[test]
+    fn every_layout_holds_the_registers_that_the_driver_works_with() {
+        for x_series in XL430_W250.registers {
+            // LEDs and the backup flag are where the model puts them; MX servos have no start-up configuration.
+            if [
+                "led",
+                "backup_ready",
+                "startup_configuration",
+                "present_load",
+            ]
+            .contains(&x_series.name)
+            {
+                continue;
+            }
+            for model in MODELS
+                .iter()
+                .filter(|model| model.protocol == Protocol::Two)
+            {
+                let found = model
+                    .register(x_series.name)
+                    .unwrap_or_else(|| panic!("{} has no {}", model.name, x_series.name));
+                let expected = match x_series.name {
+                    "indirect_address_1" => x_series.address,
+                    _ => model.layout.at(x_series.address),
+                };
+                assert_eq!(found.address, expected, "{} of {}", found.name, model.name);
+                assert_eq!(
+                    found.size, x_series.size,
+                    "{} of {}",
+                    found.name, model.name
+                );
+            }
+        }
+        for model in MODELS
+            .iter()
+            .filter(|model| model.protocol == Protocol::Two)
+        {
+            let effort = model.register_at(model.layout.at(address::PRESENT_STATE));
+            let expected = match model.effort {
+                Effort::Load => "present_load",
+                Effort::Current => "present_current",
+            };
+            assert_eq!(effort.map(|e| e.name), Some(expected), "{}", model.name);
+        }
+    }
+
+    #[test]
+    fn the_indirect_data_of_the_330_size_moved_with_firmware_52() {
+        let data = |name: &str, firmware| -> Vec<(u16, u16)> {
+            let model = Model::by_name(name).expect("a known model");
+            model
+                .indirect(firmware)
+                .map(|b| (b.data, b.slots))
+                .collect()
+        };
+        assert_eq!(data("xl330-m288", 51), [(224, 20)]);
+        assert_eq!(data("xl330-m288", 52), [(208, 20)]);
+        assert_eq!(data("xm430-w350", 52), [(224, 28), (634, 28)]);
+        assert_eq!(data("ph42-020-s300", 10), [(634, 128)]);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::chain::{DynamixelChain, Link};
 use super::client::ClientError;
-use super::model::address;
+use super::goals::resting_goal;
+use super::model::{WATCHDOG_UNIT_MS, address};
 use crate::base::Time;
 use crate::bus::BusError;
 use handwave_dynamixel::wire;
@@ -11,7 +12,7 @@ use std::time::Duration;
 /// Register 98 when the watchdog has tripped: -1.
 const TRIPPED: u8 = 0xFF;
 /// What one count of the watchdog is.
-const WATCHDOG_COUNT: Duration = Duration::from_millis(20);
+const WATCHDOG_COUNT: Duration = Duration::from_millis(WATCHDOG_UNIT_MS);
 /// How long a retry may be put off because the cycle has no room for it.
 const PATIENCE: Duration = Duration::from_millis(250);
 
@@ -63,7 +64,9 @@ impl DynamixelChain {
         let servo = &mut self.servos[index];
         let id = servo.spec.id;
         let mut torque = [0];
-        self.client.read(id, address::TORQUE_ENABLE, &mut torque)?;
+        let spec = &servo.spec;
+        self.client
+            .read(id, spec.at(address::TORQUE_ENABLE), &mut torque)?;
         if !servo.armed {
             servo.link = Link::Resting;
             return Ok(());
@@ -74,21 +77,20 @@ impl DynamixelChain {
             return Ok(());
         }
         let mut registers = [0; RETURN_BYTES];
-        self.client
-            .read(id, address::BUS_WATCHDOG, &mut registers)?;
+        let watchdog = spec.at(address::BUS_WATCHDOG);
+        self.client.read(id, watchdog, &mut registers)?;
         if registers[0] == TRIPPED {
-            self.client.write(id, address::BUS_WATCHDOG, &[0])?;
+            self.client.write(id, watchdog, &[0])?;
         }
         // It holds where it is until the goals of the coming cycles lead it back to its target.
         let [.., p0, p1, p2, p3] = registers;
-        let pulse =
-            i32::from_le_bytes([p0, p1, p2, p3]).clamp(servo.spec.min_pulse, servo.spec.max_pulse);
-        self.client
-            .write(id, address::GOAL_POSITION, &pulse.to_le_bytes())?;
-        let counts = self.options.watchdog.min(127);
-        if registers[0] != counts && servo.firmware >= servo.spec.model.watchdog_since {
-            self.client.write(id, address::BUS_WATCHDOG, &[counts])?;
+        let pulse = i32::from_le_bytes([p0, p1, p2, p3]).clamp(spec.min_pulse, spec.max_pulse);
+        let (goal, bytes, size) = resting_goal(spec, pulse);
+        self.client.write(id, goal, &bytes[..size])?;
+        if registers[0] != servo.watchdog {
+            self.client.write(id, watchdog, &[servo.watchdog])?;
         }
+        servo.follower.restart();
         servo.goal_pulse = f64::from(pulse);
         servo.link = Link::Ramping;
         Ok(())

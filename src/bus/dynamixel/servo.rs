@@ -1,8 +1,9 @@
 //! One servo of a chain: what is declared of it, and joint coordinates to counts and back.
 
-use super::model::{Model, STATE_BYTES};
+use super::model::{Effort, Mode, Model, STATE_BYTES, address};
+use super::settings::Settings;
 use crate::base::{JointState, Time};
-use std::f64::consts::TAU;
+use std::fmt;
 
 /// Which way a joint turns when the servo's count grows.
 #[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
@@ -40,7 +41,14 @@ pub struct ServoSpec {
     /// Least count that may be commanded.
     pub min_pulse: i32,
     /// Greatest count that may be commanded.
+    ///
+    /// Outside [`Mode::Position`] the range may span several turns, and the servo itself has no limits:
+    /// this range alone holds the joint.
     pub max_pulse: i32,
+    /// Operating mode that the servo is set to.
+    pub mode: Mode,
+    /// What is written to it before torque goes on.
+    pub settings: Settings,
 }
 
 /// Why a declared servo makes no sense.
@@ -64,9 +72,9 @@ pub enum SpecError {
         /// The other joint.
         second: String,
     },
-    /// The range is empty or not within one turn.
+    /// The range is empty or not within what the mode has.
     #[error(
-        "joint {joint}: pulse range {min} to {max} is not an ascending range within 0 to {top}"
+        "joint {joint}: pulse range {min} to {max} is not an ascending range within {bottom} to {top}{hint}"
     )]
     Range {
         /// Joint.
@@ -75,53 +83,155 @@ pub enum SpecError {
         min: i32,
         /// Greatest count.
         max: i32,
-        /// The greatest that the model has.
+        /// The least that the model has in that mode.
+        bottom: i32,
+        /// The greatest that the model has in that mode.
         top: i32,
+        /// What else could be meant.
+        hint: &'static str,
+    },
+    /// The model does not have the mode, or it is none for joints.
+    #[error("joint {joint}: {model} has no mode \"{mode}\" for joints{reason}. Allowed: {}", Names(.modes))]
+    Mode {
+        /// Joint.
+        joint: String,
+        /// Name of the model.
+        model: &'static str,
+        /// Name of the mode.
+        mode: &'static str,
+        /// Why, if that is known.
+        reason: &'static str,
+        /// Modes that it has for joints.
+        modes: Vec<&'static str>,
+    },
+    /// A setting that the model or mode cannot have.
+    #[error("joint {joint}: {problem}")]
+    Setting {
+        /// Joint.
+        joint: String,
+        /// What was found and what is allowed.
+        problem: String,
     },
 }
 
+/// Names with commas between.
+struct Names<'a>(&'a [&'static str]);
+
+impl fmt::Display for Names<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.join(", "))
+    }
+}
+
 impl ServoSpec {
-    /// A servo of `model` whose joint is 0 in the middle of the turn and may use the whole turn.
+    /// A servo of `model` in position mode whose joint is 0 in the middle of the turn and may use the whole turn.
     pub fn new(id: u8, joint: impl Into<String>, model: &'static Model) -> Self {
-        let turn = model.pulses_per_turn as i32;
+        let (min_pulse, max_pulse) = model.goal_range(Mode::Position);
         ServoSpec {
             id,
             joint: joint.into(),
             model,
-            zero_pulse: turn / 2,
+            zero_pulse: model.centre_pulse,
             direction: Direction::Forward,
-            min_pulse: 0,
-            max_pulse: turn - 1,
+            min_pulse,
+            max_pulse,
+            mode: Mode::Position,
+            settings: Settings::default(),
+        }
+    }
+
+    /// The same in another mode, with another range.
+    pub fn in_mode(self, mode: Mode, min_pulse: i32, max_pulse: i32) -> Self {
+        ServoSpec {
+            mode,
+            min_pulse,
+            max_pulse,
+            ..self
         }
     }
 
     /// Checks one servo on its own.
     pub fn check(&self) -> Result<(), SpecError> {
-        let top = self.model.pulses_per_turn as i32 - 1;
+        let joint = || self.joint.clone();
         if self.id > handwave_dynamixel::MAX_ID {
             return Err(SpecError::Id {
-                joint: self.joint.clone(),
+                joint: joint(),
                 id: self.id,
             });
         }
-        if self.min_pulse < 0 || self.max_pulse > top || self.min_pulse >= self.max_pulse {
-            return Err(SpecError::Range {
-                joint: self.joint.clone(),
-                min: self.min_pulse,
-                max: self.max_pulse,
-                top,
+        if !self.model.modes.contains(&self.mode) || self.mode == Mode::Pwm {
+            let joint_modes = self.model.modes.iter().filter(|mode| **mode != Mode::Pwm);
+            let loads = self.mode.uses_current() && self.model.effort == Effort::Load;
+            return Err(SpecError::Mode {
+                joint: joint(),
+                model: self.model.name,
+                mode: self.mode.name(),
+                reason: if loads {
+                    ": it reports load and measures no current"
+                } else {
+                    ""
+                },
+                modes: joint_modes.map(|mode| mode.name()).collect(),
             });
         }
-        Ok(())
+        let (bottom, top) = self.model.goal_range(self.mode);
+        if self.min_pulse < bottom || self.max_pulse > top || self.min_pulse >= self.max_pulse {
+            let turns = self.mode.has_position_limits() && self.min_pulse < self.max_pulse;
+            return Err(SpecError::Range {
+                joint: joint(),
+                min: self.min_pulse,
+                max: self.max_pulse,
+                bottom,
+                top,
+                hint: if turns {
+                    "; several turns need mode \"extended_position\""
+                } else {
+                    ""
+                },
+            });
+        }
+        self.settings
+            .check(self.model, self.mode)
+            .map_err(|problem| SpecError::Setting {
+                joint: joint(),
+                problem,
+            })
     }
 
-    fn pulse_rad(&self) -> f64 {
-        self.direction.sign() * TAU / self.model.pulses_per_turn
+    /// This servo's address of an X series register.
+    pub fn at(&self, x_series: u16) -> u16 {
+        self.model.layout.at(x_series)
+    }
+
+    /// The address that its goal is written to in every cycle, and the goal's bytes.
+    pub fn goal_register(&self) -> (u16, u8) {
+        let (x_series, bytes) = self.mode.goal();
+        (self.at(x_series), bytes)
+    }
+
+    /// The address from which its state is read in every cycle, [`STATE_BYTES`] long.
+    pub fn state_register(&self) -> u16 {
+        self.at(address::PRESENT_STATE)
+    }
+
+    /// Radians that the joint turns per count.
+    pub(super) fn pulse_rad(&self) -> f64 {
+        self.direction.sign() * self.model.pulse_rad()
     }
 
     /// Joint position in radians at `pulse`.
     pub fn position_rad(&self, pulse: i32) -> f64 {
-        (f64::from(pulse) - f64::from(self.zero_pulse)) * self.pulse_rad()
+        self.radians_at(f64::from(pulse))
+    }
+
+    /// Joint position in radians at a count with fractions.
+    pub(super) fn radians_at(&self, pulse: f64) -> f64 {
+        (pulse - f64::from(self.zero_pulse)) * self.pulse_rad()
+    }
+
+    /// The count, with fractions and not clamped, at a joint position in radians.
+    pub(super) fn pulse_at(&self, position_rad: f64) -> f64 {
+        position_rad / self.pulse_rad() + f64::from(self.zero_pulse)
     }
 
     /// The count for a joint position in radians, within the declared range; `None` for NaN.
@@ -129,7 +239,7 @@ impl ServoSpec {
         if position_rad.is_nan() {
             return None;
         }
-        let pulse = (position_rad / self.pulse_rad() + f64::from(self.zero_pulse)).round();
+        let pulse = self.pulse_at(position_rad).round();
         // In range by the clamp, so the conversion is exact.
         Some(pulse.clamp(self.min_pulse.into(), self.max_pulse.into()) as i32)
     }
@@ -139,7 +249,7 @@ impl ServoSpec {
         (self.min_pulse..=self.max_pulse).contains(&pulse)
     }
 
-    /// The joint state in the registers from 126 on: load, velocity, position.
+    /// The joint state in the registers from 126 on: load or current, velocity, position. Effort is in the model's unit.
     pub fn state(&self, registers: &[u8; STATE_BYTES], measured_at: Time) -> JointState {
         let [l0, l1, v0, v1, v2, v3, p0, p1, p2, p3] = *registers;
         let sign = self.direction.sign();
@@ -204,6 +314,36 @@ mod tests {
         ] {
             assert_eq!(spec.goal_pulse(position_rad), expected, "{position_rad}");
         }
+    }
+
+    #[test]
+    fn several_turns_are_for_modes_that_have_them() {
+        let turns = |mode, min, max| spec().in_mode(mode, min, max).check();
+        assert_eq!(turns(Mode::ExtendedPosition, -4096, 8191), Ok(()));
+        assert_eq!(turns(Mode::Velocity, -1_048_575, 1_048_575), Ok(()));
+        for (mode, min, max, expected) in [
+            (Mode::Position, 0, 8191, "extended_position"),
+            (Mode::Position, 4095, 0, "ascending range within 0 to 4095"),
+            (Mode::ExtendedPosition, 0, 1_048_576, "-1048575 to 1048575"),
+            (
+                Mode::Current,
+                0,
+                4095,
+                "measures no current. Allowed: velocity, position, extended_position",
+            ),
+            (Mode::CurrentBasedPosition, 0, 4095, "measures no current"),
+            (Mode::Pwm, 0, 4095, "Allowed: velocity"),
+        ] {
+            let message = turns(mode, min, max).expect_err("refused").to_string();
+            assert!(
+                message.contains(expected),
+                "{mode:?} {min}..{max}: {message}"
+            );
+        }
+        let fine = Model::by_name("ph42-020-s300").expect("a known model");
+        let spec = ServoSpec::new(1, "hip", fine);
+        assert_eq!((spec.min_pulse, spec.max_pulse), (-303_750, 303_750));
+        assert_eq!(spec.goal_pulse(FRAC_PI_2), Some(151_875));
     }
 
     #[test]

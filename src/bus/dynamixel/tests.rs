@@ -296,9 +296,10 @@ fn an_unfit_servo_is_refused_with_the_command_that_mends_it() {
     for (address, bytes, part) in [
         (
             0,
-            &[0xFC, 0x03][..],
-            "it is an unknown model (model number 1020)",
+            &[0x5E, 0x01][..],
+            "it is an unknown model (model number 350)",
         ),
+        (0, &[0xFC, 0x03][..], "it is xm430-w350 (model number 1020)"),
         (
             11,
             &[4],

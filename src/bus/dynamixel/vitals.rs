@@ -47,7 +47,10 @@ impl Vitals {
         let all = names.iter().chain(&EFFORT).chain(&VELOCITY).chain(&VOLTAGE);
         let registers: Vec<&Register> = all.filter_map(|name| model.register(name)).collect();
         let begin = registers.iter().map(|r| r.address).min().unwrap_or(0);
-        let end = registers.iter().map(|r| r.address + u16::from(r.size)).max();
+        let end = registers
+            .iter()
+            .map(|r| r.address + u16::from(r.size))
+            .max();
         let length = usize::from(end.unwrap_or(begin) - begin);
         if length == 0 || length > LONGEST {
             return Ok(Self::default());
@@ -129,7 +132,10 @@ mod tests {
         assert_eq!(vitals.pulse, Some(-7));
         assert_eq!(vitals.effort, Some((-5.5, "%")));
         let (velocity, unit) = vitals.velocity.expect("a velocity");
-        assert!((velocity - 2.29).abs() < 1e-9 && unit == "rev/min", "{velocity} {unit}");
+        assert!(
+            (velocity - 2.29).abs() < 1e-9 && unit == "rev/min",
+            "{velocity} {unit}"
+        );
         assert_eq!(vitals.temperature_c, Some(71.0));
         assert!((vitals.voltage_v.expect("a voltage") - 11.8).abs() < 1e-9);
         assert_eq!(vitals.error_names(), "overheating, overload");

@@ -4,12 +4,14 @@ use super::ask::{Ask, interrupted, prompt};
 use super::setup::progress;
 use super::{crew, open, say};
 use crate::bus::BusAddress;
-use crate::bus::dynamixel::setup::calibrate::{Follower, LEAST_MOVE_RAD, RangeProblem, direction, range};
+use crate::bus::dynamixel::setup::calibrate::{
+    Follower, LEAST_MOVE_RAD, RangeProblem, direction, range,
+};
 use crate::bus::dynamixel::setup::plan::value;
 use crate::bus::dynamixel::{Client, ClientError, Direction, ServoSpec};
 use crate::cli::{ExitStatus, Failure};
-use crate::config::edit::with_joint_map;
 use crate::config::Character;
+use crate::config::edit::with_joint_map;
 use clap::Args;
 use std::cell::RefCell;
 use std::io::Write;
@@ -79,7 +81,13 @@ pub fn calibrate(args: &CalibrateArgs, out: &mut dyn Write) -> Result<ExitStatus
     for (number, spec) in todo.iter().enumerate() {
         say(
             out,
-            format_args!("\n{} of {}: {} (servo {})", number + 1, todo.len(), spec.joint, spec.id),
+            format_args!(
+                "\n{} of {}: {} (servo {})",
+                number + 1,
+                todo.len(),
+                spec.joint,
+                spec.id
+            ),
         )?;
         if let Some(spec) = hands.joint(args, &character, spec, out)? {
             learnt.push(spec);
@@ -89,7 +97,10 @@ pub fn calibrate(args: &CalibrateArgs, out: &mut dyn Write) -> Result<ExitStatus
         say(out, "nothing was learnt, nothing is written")?;
         return Ok(ExitStatus::Done);
     }
-    say(out, "\njoint              zero_pulse     direction   range_pulse")?;
+    say(
+        out,
+        "\njoint              zero_pulse     direction   range_pulse",
+    )?;
     for new in &learnt {
         let Some(old) = character.servos.iter().find(|s| s.joint == new.joint) else {
             continue;
@@ -146,7 +157,12 @@ fn write(
                 out,
                 format_args!(
                     "  {{ name = \"{}\", servo = {}, zero_pulse = {}, direction = {}, range_pulse = [{}, {}] }},",
-                    spec.joint, spec.id, spec.zero_pulse, spec.direction.sign(), spec.min_pulse, spec.max_pulse
+                    spec.joint,
+                    spec.id,
+                    spec.zero_pulse,
+                    spec.direction.sign(),
+                    spec.min_pulse,
+                    spec.max_pulse
                 ),
             )?;
         }
@@ -157,7 +173,11 @@ fn write(
     let back = |failure: Failure| -> Failure {
         let told = match std::fs::write(path, &before) {
             Ok(()) => format!("{} is as it was before", path.display()),
-            Err(e) => format!("{} could not be put back ({e}): it is in {}", path.display(), kept.display()),
+            Err(e) => format!(
+                "{} could not be put back ({e}): it is in {}",
+                path.display(),
+                kept.display()
+            ),
         };
         Failure {
             message: format!("{}. {told}", failure.message),
@@ -165,7 +185,10 @@ fn write(
         }
     };
     let character = crew::character(path).map_err(back)?;
-    say(out, "\nWritten. Now the test: each joint once more in its positive direction.")?;
+    say(
+        out,
+        "\nWritten. Now the test: each joint once more in its positive direction.",
+    )?;
     for new in learnt {
         let spec = character.servos.iter().find(|s| s.joint == new.joint);
         let Some(spec) = spec else { continue };
@@ -179,7 +202,9 @@ fn way(character: &Character, joint: &str) -> String {
     let index = character.joints.iter().position(|name| name == joint);
     let rest = vec![0.0; character.joints.len()];
     let model = character.model.as_ref().zip(index);
-    model.map_or(String::new(), |(model, index)| model.positive_way(index, &rest))
+    model.map_or(String::new(), |(model, index)| {
+        model.positive_way(index, &rest)
+    })
 }
 
 impl Hands {
@@ -203,14 +228,26 @@ impl Hands {
         let zero = hand.now();
         let per_turn = spec.model.pulses_per_turn;
         spec.zero_pulse = zero.rem_euclid(per_turn as i64) as i32;
-        say(out, format_args!("    zero is at pulse {}", spec.zero_pulse))?;
+        say(
+            out,
+            format_args!("    zero is at pulse {}", spec.zero_pulse),
+        )?;
         spec.direction = self.direction(character, old, out)?;
         if args.no_range {
             return Ok(Some(spec));
         }
         let limits = character.joints.iter().position(|name| *name == old.joint);
         let limits = limits
-            .and_then(|index| Some(character.model.as_ref()?.limits().get(index).map(|l| (l.lower, l.upper))?))
+            .and_then(|index| {
+                Some(
+                    character
+                        .model
+                        .as_ref()?
+                        .limits()
+                        .get(index)
+                        .map(|l| (l.lower, l.upper))?,
+                )
+            })
             .unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
         loop {
             let text = format!(
@@ -261,7 +298,10 @@ impl Hands {
         );
         let first = self.sense(out, old, &text)?;
         if first == old.direction {
-            say(out, format_args!("    direction {:+}, as configured", first.sign()))?;
+            say(
+                out,
+                format_args!("    direction {:+}, as configured", first.sign()),
+            )?;
             return Ok(first);
         }
         say(
@@ -336,9 +376,15 @@ impl Hands {
                 )));
             }
             if moved >= LEAST_MOVE_RAD {
-                return say(out, format_args!("    reads {:+.1} degrees, right", moved.to_degrees()));
+                return say(
+                    out,
+                    format_args!("    reads {:+.1} degrees, right", moved.to_degrees()),
+                );
             }
-            say(out, format_args!("    it has moved by {:.1} degrees only", moved.to_degrees()))?;
+            say(
+                out,
+                format_args!("    it has moved by {:.1} degrees only", moved.to_degrees()),
+            )?;
         }
     }
 
@@ -364,22 +410,23 @@ impl Hands {
         prompt(out, text);
         let (client, ask) = (&mut self.client, &mut self.ask);
         let mut misses = 0;
-        let line = ask.line(&mut || {
-            match value(&mut **client, spec.id, spec.model, "present_position") {
-                Ok(read) => {
-                    misses = 0;
-                    if let Some((_, pulse)) = read {
-                        hand.borrow_mut().push(pulse as i32);
+        let line =
+            ask.line(
+                &mut || match value(&mut **client, spec.id, spec.model, "present_position") {
+                    Ok(read) => {
+                        misses = 0;
+                        if let Some((_, pulse)) = read {
+                            hand.borrow_mut().push(pulse as i32);
+                        }
+                        Ok(())
                     }
-                    Ok(())
-                }
-                Err(ClientError::Timeout { .. }) if misses < MISSES => {
-                    misses += 1;
-                    Ok(())
-                }
-                Err(error) => Err(error.into()),
-            }
-        });
+                    Err(ClientError::Timeout { .. }) if misses < MISSES => {
+                        misses += 1;
+                        Ok(())
+                    }
+                    Err(error) => Err(error.into()),
+                },
+            );
         let line = line.map_err(|failure| match failure.status {
             ExitStatus::Interrupted => interrupted("interrupted; torque is off"),
             _ => failure,

@@ -46,7 +46,12 @@ pub struct JogArgs {
     #[arg(value_name = "ID", value_parser = clap::value_parser!(u8).range(0..=252))]
     id: u8,
     /// Go there: degrees from the middle, or pulses with a p, such as 2048p.
-    #[arg(long, value_name = "DEG|PULSEp", allow_hyphen_values = true, conflicts_with = "by")]
+    #[arg(
+        long,
+        value_name = "DEG|PULSEp",
+        allow_hyphen_values = true,
+        conflicts_with = "by"
+    )]
     to: Option<Spot>,
     /// Go so far from where it stands: degrees, or pulses with a p.
     #[arg(long, value_name = "DEG|PULSEp", allow_hyphen_values = true)]
@@ -75,7 +80,9 @@ impl FromStr for Spot {
             Some(pulses) => number(pulses).map(Spot::Pulses),
             None => number(text.strip_suffix("deg").unwrap_or(text)).map(Spot::Degrees),
         }
-        .ok_or_else(|| format!("'{text}' is neither degrees, such as -12.5, nor pulses, such as 2048p"))
+        .ok_or_else(|| {
+            format!("'{text}' is neither degrees, such as -12.5, nor pulses, such as 2048p")
+        })
     }
 }
 
@@ -175,7 +182,10 @@ pub fn jog(args: &JogArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure> {
             place(&spec, reached)
         )));
     }
-    say(out, format_args!("at {}, torque off", place(&spec, reached)))?;
+    say(
+        out,
+        format_args!("at {}, torque off", place(&spec, reached)),
+    )?;
     Ok(ExitStatus::Done)
 }
 

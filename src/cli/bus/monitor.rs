@@ -266,7 +266,18 @@ impl Watched {
             let silent = Cell::plain("silent: check cable, power, baud rate").at(Level::Bad);
             let blank = || Cell::plain("");
             return vec![
-                id, joint, model, blank(), blank(), blank(), blank(), blank(), blank(), blank(), missed, silent,
+                id,
+                joint,
+                model,
+                blank(),
+                blank(),
+                blank(),
+                blank(),
+                blank(),
+                blank(),
+                blank(),
+                missed,
+                silent,
             ];
         };
         let number = |value: Option<f64>, digits: usize| {
@@ -285,7 +296,11 @@ impl Watched {
             _ => Level::Plain,
         };
         let errors = vitals.error_names();
-        let wrong = if errors.is_empty() { Level::Plain } else { Level::Bad };
+        let wrong = if errors.is_empty() {
+            Level::Plain
+        } else {
+            Level::Bad
+        };
         let outside = self
             .spec
             .as_ref()

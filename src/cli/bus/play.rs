@@ -79,7 +79,9 @@ pub fn play(args: &PlayArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
     crew::all_there(&mut *client, &specs)?;
     let joints: Vec<String> = specs.iter().map(|spec| spec.joint.clone()).collect();
     let playback = playback(args, take, &joints)?;
-    playback.check(&joints, &limits).map_err(|e| named(args, e))?;
+    playback
+        .check(&joints, &limits)
+        .map_err(|e| named(args, e))?;
 
     let mut ask = Ask::new(args.yes)?;
     let chain = crew::chain(client, specs, &args.bus, RATE_HZ, false)?;
@@ -143,7 +145,11 @@ pub fn play(args: &PlayArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
             return Ok(true);
         }
         // What the envelope still holds back.
-        let end = if args.stay { back.at(0.0) } else { rest.clone() };
+        let end = if args.stay {
+            back.at(0.0)
+        } else {
+            rest.clone()
+        };
         part("settling", BRAKE_S, &|_| end.clone())
     };
     let ended = run();
@@ -163,7 +169,9 @@ pub fn play(args: &PlayArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
         )));
     }
     if stopped {
-        return Err(interrupted("interrupted; the joints have braked, torque is off"));
+        return Err(interrupted(
+            "interrupted; the joints have braked, torque is off",
+        ));
     }
     say(
         out,
@@ -210,7 +218,9 @@ fn of_take(
         })?;
         let spec = crew::spec_of(client, id)?;
         let top = value(client, id, spec.model, "velocity_limit")?;
-        let velocity = top.map_or(3.0, |(_, counts)| counts as f64 * spec.model.velocity_unit_rad_s);
+        let velocity = top.map_or(3.0, |(_, counts)| {
+            counts as f64 * spec.model.velocity_unit_rad_s
+        });
         limits.push(JointEnvelope {
             lower: spec.position_rad(spec.min_pulse),
             upper: spec.position_rad(spec.max_pulse),

@@ -66,8 +66,8 @@ pub fn record(args: &RecordArgs, out: &mut dyn Write) -> Result<ExitStatus, Fail
     crew::all_there(&mut *client, &specs)?;
     crew::release(&mut *client, &specs, &mut ask, out)?;
     let chain = crew::chain(client, specs, &args.bus, args.rate, false)?;
-    let mut drive = Drive::begin(Box::new(chain), clock, Vec::new(), args.rate)
-        .map_err(super::jog::failure)?;
+    let mut drive =
+        Drive::begin(Box::new(chain), clock, Vec::new(), args.rate).map_err(super::jog::failure)?;
     let file_error =
         |e: std::io::Error| Failure::input(format_args!("--out {}: {e}", args.out.display()));
     let mut file = BufWriter::new(File::create(&args.out).map_err(file_error)?);
@@ -75,7 +75,10 @@ pub fn record(args: &RecordArgs, out: &mut dyn Write) -> Result<ExitStatus, Fail
 
     let by_enter = args.seconds.is_none();
     if by_enter && !args.yes {
-        prompt(out, "torque is off: take hold of the robot, and press Enter to begin ");
+        prompt(
+            out,
+            "torque is off: take hold of the robot, and press Enter to begin ",
+        );
         ask.line(&mut || Ok(()))?;
     }
     say(
@@ -105,7 +108,10 @@ pub fn record(args: &RecordArgs, out: &mut dyn Write) -> Result<ExitStatus, Fail
         writeln!(file).map_err(file_error)?;
         rows += 1;
         if rows.is_multiple_of(25) {
-            let degrees: Vec<String> = drive.positions().map(|q| format!("{:.0}", q.to_degrees())).collect();
+            let degrees: Vec<String> = drive
+                .positions()
+                .map(|q| format!("{:.0}", q.to_degrees()))
+                .collect();
             progress(Some(format_args!("{t:.1} s, {} deg", degrees.join(" "))));
         }
         if by_enter && ask.line_within(Duration::ZERO).is_some() {
@@ -125,11 +131,18 @@ pub fn record(args: &RecordArgs, out: &mut dyn Write) -> Result<ExitStatus, Fail
         drive.missed
     );
     match ended {
-        Err(error) => Err(Failure::bus(format_args!("{error}. Kept so far: {summary}"))),
-        Ok(true) => Err(interrupted(format_args!("interrupted; torque is off. {summary}"))),
+        Err(error) => Err(Failure::bus(format_args!(
+            "{error}. Kept so far: {summary}"
+        ))),
+        Ok(true) => Err(interrupted(format_args!(
+            "interrupted; torque is off. {summary}"
+        ))),
         Ok(false) => {
             say(out, summary)?;
-            let config = args.config.as_ref().map_or(String::new(), |c| format!("--config {} ", c.display()));
+            let config = args
+                .config
+                .as_ref()
+                .map_or(String::new(), |c| format!("--config {} ", c.display()));
             say(
                 out,
                 format_args!(

@@ -3,7 +3,7 @@
 use super::{IdList, open, say};
 use crate::base::suggest;
 use crate::bus::BusAddress;
-use crate::bus::dynamixel::model::{Access, address};
+use crate::bus::dynamixel::model::{Access, Layout, address};
 use crate::bus::dynamixel::{Client, Model, Register};
 use crate::cli::{ExitStatus, Failure};
 use clap::Args;
@@ -98,13 +98,14 @@ pub fn write(args: &WriteArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
     // All servos are looked at before the first is written.
     let mut plan = Vec::new();
     for id in args.ids.iter() {
-        let register = Servo::ask(&mut *client, id)?.register(&args.item)?;
-        check_write(&mut *client, &args.bus, id, &register, args.value)?;
-        plan.push((id, register));
+        let servo = Servo::ask(&mut *client, id)?;
+        let register = servo.register(&args.item)?;
+        check_write(&mut *client, &args.bus, &servo, &register, args.value)?;
+        plan.push((id, servo.layout(), register));
     }
-    for (id, register) in plan {
-        if register.address == address::TORQUE_ENABLE && args.value == 1 {
-            hold_position(&mut *client, id)?;
+    for (id, layout, register) in plan {
+        if register.address == layout.at(address::TORQUE_ENABLE) && args.value == 1 {
+            hold_position(&mut *client, id, layout)?;
         }
         let bytes = register.encode(args.value);
         client.write(id, register.address, &bytes[..usize::from(register.size)])?;
@@ -132,10 +133,11 @@ pub fn write(args: &WriteArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
 fn check_write(
     client: &mut dyn Client,
     bus: &BusAddress,
-    id: u8,
+    servo: &Servo,
     register: &Register,
     value: i64,
 ) -> Result<(), Failure> {
+    let (id, layout) = (servo.id, servo.layout());
     let name = register.name;
     if register.access == Access::Read {
         return Err(Failure::input(format_args!("{name} is read-only")));
@@ -146,9 +148,9 @@ fn check_write(
             register.min, register.max
         )));
     }
-    if register.is_eeprom() {
+    if layout.is_eeprom(register.address) {
         let mut torque = [0];
-        client.read(id, address::TORQUE_ENABLE, &mut torque)?;
+        client.read(id, layout.at(address::TORQUE_ENABLE), &mut torque)?;
         if torque != [0] {
             return Err(Failure::bus(format_args!(
                 "servo {id} has its torque on, and {name} can be written only while it is off. \
@@ -160,11 +162,11 @@ fn check_write(
 }
 
 /// Makes the present position the goal, so that torque does not start a motion.
-fn hold_position(client: &mut dyn Client, id: u8) -> Result<(), Failure> {
+fn hold_position(client: &mut dyn Client, id: u8, layout: Layout) -> Result<(), Failure> {
     let mut position = [0; 4];
-    client.read(id, address::PRESENT_POSITION, &mut position)?;
+    client.read(id, layout.at(address::PRESENT_POSITION), &mut position)?;
     // In modes without a goal position it is refused, and nothing is lost.
-    match client.write(id, address::GOAL_POSITION, &position) {
+    match client.write(id, layout.at(address::GOAL_POSITION), &position) {
         Ok(_) | Err(crate::bus::dynamixel::ClientError::Refused { .. }) => Ok(()),
         Err(error) => Err(error.into()),
     }
@@ -193,6 +195,11 @@ impl Servo {
             number: ping.model,
             model: Model::by_number(ping.model),
         })
+    }
+
+    /// Where its registers lie; those of an unknown model as on X series servos.
+    fn layout(&self) -> Layout {
+        self.model.map_or(Layout::X, |model| model.layout)
     }
 
     fn model(&self) -> Result<&'static Model, Failure> {

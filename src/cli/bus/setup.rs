@@ -88,7 +88,12 @@ fn parse_rates(text: &str, target: u32) -> Result<Vec<u32>, Failure> {
             .collect::<Result<_, _>>()?,
     };
     let mut seen = Vec::new();
-    rates.retain(|rate| !seen.contains(rate) && { seen.push(*rate); true });
+    rates.retain(|rate| {
+        !seen.contains(rate) && {
+            seen.push(*rate);
+            true
+        }
+    });
     Ok(rates)
 }
 
@@ -202,11 +207,7 @@ fn posts(args: &SetupArgs, baud: u32) -> Result<Vec<Post>, Failure> {
             zero_here: args.zero_here,
         },
     };
-    Ok(character
-        .servos
-        .iter()
-        .map(post)
-        .collect())
+    Ok(character.servos.iter().map(post).collect())
 }
 
 impl Bench<'_> {
@@ -238,7 +239,10 @@ impl Bench<'_> {
                 id: post.wanted.id,
                 baud: self.baud,
             };
-            let here = there.found.iter().find(|f| f.ping.id == place.id && !f.garbled);
+            let here = there
+                .found
+                .iter()
+                .find(|f| f.ping.id == place.id && !f.garbled);
             let complete = match here {
                 Some(found) => self.changes(found, post)?.is_empty(),
                 None => false,
@@ -260,7 +264,11 @@ impl Bench<'_> {
                     );
                     match self.ask.line(&mut || Ok(()))?.as_str() {
                         "s" => break,
-                        "q" => return Err(interrupted("ended; what was set up stays so. The same command goes on from here")),
+                        "q" => {
+                            return Err(interrupted(
+                                "ended; what was set up stays so. The same command goes on from here",
+                            ));
+                        }
                         _ => {}
                     }
                 }
@@ -313,7 +321,11 @@ impl Bench<'_> {
         }
         say(out, "    register                   now      new  unit")?;
         for Change { register, old, new } in &changes {
-            let line = format!("    {:<22} {old:>7}  {new:>7}  {}", register.name, unit(register.name, *new, register.unit));
+            let line = format!(
+                "    {:<22} {old:>7}  {new:>7}  {}",
+                register.name,
+                unit(register.name, *new, register.unit)
+            );
             say(out, line.trim_end())?;
         }
         if !self.ask.confirm(out, "  Write these?", true)? {
@@ -327,7 +339,10 @@ impl Bench<'_> {
             Ok(place) => {
                 say(
                     out,
-                    format_args!("  written and read back: {} is {place}, torque off", post.name),
+                    format_args!(
+                        "  written and read back: {} is {place}, torque off",
+                        post.name
+                    ),
                 )?;
                 Ok(Outcome::Done)
             }
@@ -341,38 +356,66 @@ impl Bench<'_> {
         let list = |found: &[Found]| {
             let names: Vec<String> = found
                 .iter()
-                .map(|f| format!("{} {} at {} baud", model_name(f.ping.model), f.ping.id, f.baud))
+                .map(|f| {
+                    format!(
+                        "{} {} at {} baud",
+                        model_name(f.ping.model),
+                        f.ping.id,
+                        f.baud
+                    )
+                })
                 .collect();
             names.join(", ")
         };
         if swept.collisions() {
-            let mut at: Vec<String> = swept.noise.iter().map(|baud| format!("at {baud} baud")).collect();
-            at.extend(swept.found.iter().filter(|f| f.garbled).map(|f| format!("id {} at {} baud", f.ping.id, f.baud)));
+            let mut at: Vec<String> = swept
+                .noise
+                .iter()
+                .map(|baud| format!("at {baud} baud"))
+                .collect();
+            at.extend(
+                swept
+                    .found
+                    .iter()
+                    .filter(|f| f.garbled)
+                    .map(|f| format!("id {} at {} baud", f.ping.id, f.baud)),
+            );
             return Err(format!(
                 "several servos answer at once ({}) and damage each other's words: they have the same id. Unplug all of them but one",
                 at.join(", ")
             ));
         }
         let there = |f: &&Found| f.ping.id == wanted.id && f.baud == wanted.baud;
-        let known = |f: &Found| f.baud == wanted.baud && (self.args.config.is_none() || self.crew.contains(&f.ping.id));
+        let known = |f: &Found| {
+            f.baud == wanted.baud && (self.args.config.is_none() || self.crew.contains(&f.ping.id))
+        };
         let strangers: Vec<Found> = swept.found.iter().filter(|f| !known(f)).copied().collect();
         match (swept.found.as_slice(), strangers.as_slice()) {
             ([], _) => Err(format!(
                 "no servo answers. Check its power (the LED blinks once at power-up) and its cable{}",
-                if self.rates.len() < RATES.len() { "; --at all looks at every baud rate" } else { "" }
+                if self.rates.len() < RATES.len() {
+                    "; --at all looks at every baud rate"
+                } else {
+                    ""
+                }
             )),
             // The only one there is meant, unless it is another's of this chain.
             ([only], _) if there(&only) || self.args.config.is_none() || !known(only) => Ok(*only),
             (_, [new]) => match swept.found.iter().find(there) {
                 Some(_) => Err(format!(
                     "id {} at {} baud is taken already, and {} is new here. Unplug the one that has the id to replace it, or give the new one another",
-                    wanted.id, wanted.baud, list(&[*new])
+                    wanted.id,
+                    wanted.baud,
+                    list(&[*new])
                 )),
                 None => Ok(*new),
             },
             (_, []) => match swept.found.iter().find(there) {
                 Some(found) if self.args.config.is_some() => Ok(*found),
-                _ => Err(format!("no new servo is among those that answer: {}. Plug the new one in, or unplug all but the one that is meant", list(&swept.found))),
+                _ => Err(format!(
+                    "no new servo is among those that answer: {}. Plug the new one in, or unplug all but the one that is meant",
+                    list(&swept.found)
+                )),
             },
             (_, several) => Err(format!(
                 "{} servos answer that are not set up: {}. Unplug all of them but one",
@@ -391,7 +434,9 @@ impl Bench<'_> {
         progress(None);
         let swept = swept.map_err(Failure::from)?;
         if self.ask.is_stopped() {
-            return Err(interrupted("interrupted; nothing was written to this servo"));
+            return Err(interrupted(
+                "interrupted; nothing was written to this servo",
+            ));
         }
         Ok(swept)
     }
@@ -438,7 +483,11 @@ impl Bench<'_> {
         let name = |c: &Change| c.register.name;
         let done: Vec<&str> = changes[..halt.done].iter().map(name).collect();
         let left: Vec<&str> = changes[halt.done..].iter().map(name).collect();
-        let done = if done.is_empty() { "nothing".into() } else { done.join(", ") };
+        let done = if done.is_empty() {
+            "nothing".into()
+        } else {
+            done.join(", ")
+        };
         let text = format!(
             "{}.\n  The servo is now {}; written: {done}; not yet: {}.\n  \
              Plug in this servo and do the same again: it goes on from there. Or back: handwave bus setup --undo {} {}",
@@ -450,7 +499,8 @@ impl Bench<'_> {
         );
         match &halt.reason {
             SetupError::Stopped => Err(interrupted(text)),
-            SetupError::Client(crate::bus::dynamixel::ClientError::Port(_)) | SetupError::File { .. } => Err(Failure::bus(text)),
+            SetupError::Client(crate::bus::dynamixel::ClientError::Port(_))
+            | SetupError::File { .. } => Err(Failure::bus(text)),
             _ => Ok(Outcome::Again(text)),
         }
     }
@@ -464,7 +514,11 @@ impl Bench<'_> {
         let ids: Vec<String> = groups.iter().map(|g| g.place().id.to_string()).collect();
         let group = match groups.as_slice() {
             [group] => group,
-            [] => return Err(Failure::input("there is nothing in this file that could be undone")),
+            [] => {
+                return Err(Failure::input(
+                    "there is nothing in this file that could be undone",
+                ));
+            }
             _ => {
                 return Err(Failure::input(format_args!(
                     "this file has changes of several servos, now {}. One at a time: --id N, and only that servo plugged in",
@@ -485,7 +539,10 @@ impl Bench<'_> {
             .ok_or_else(|| Failure::input(format_args!("unknown model {}", group.model)))?;
         say(out, format_args!("  {} is {place}; back to:", group.model))?;
         for entry in group.entries.iter().rev() {
-            say(out, format_args!("    {:<22} {:>7}", entry.register, entry.old))?;
+            say(
+                out,
+                format_args!("    {:<22} {:>7}", entry.register, entry.old),
+            )?;
         }
         if !self.ask.confirm(out, "  Write these?", true)? {
             return Err(Failure::input("nothing was written"));
@@ -493,7 +550,10 @@ impl Bench<'_> {
         match restore(&mut *self.client, place, model, group) {
             Ok((count, place)) => {
                 file.note_undone(id).map_err(Failure::bus)?;
-                say(out, format_args!("  {count} registers put back and read: the servo is {place}"))
+                say(
+                    out,
+                    format_args!("  {count} registers put back and read: the servo is {place}"),
+                )
             }
             Err(halt) => Err(Failure::bus(format_args!(
                 "{}. The servo is {}; {} registers are put back. The same command goes on from there",
@@ -572,7 +632,10 @@ mod tests {
     fn rates_to_look_at_come_once_and_likely_ones_first() {
         let all = parse_rates("all", 1_000_000).expect("a good list");
         assert_eq!((all[0], all[1], all.len()), (1_000_000, 57_600, 8));
-        assert_eq!(parse_rates("57600, 115200", 1).expect("a good list"), [57_600, 115_200]);
+        assert_eq!(
+            parse_rates("57600, 115200", 1).expect("a good list"),
+            [57_600, 115_200]
+        );
         assert!(parse_rates("fast", 1).is_err());
     }
 

@@ -70,24 +70,39 @@ pub struct Imported {
 /// # Errors
 /// A file that cannot be read, is of no known kind, or has a fault, with its place.
 pub fn open(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
+    let (file, _) = split_selector(path);
+    let bytes = check_rate(options)
+        .and_then(|()| read_bytes(&file))
+        .map_err(|fault| fault.in_file(&file.display().to_string()))?;
+    open_bytes(path, &bytes, options)
+}
+
+/// The same of a file whose content is at hand; what it refers to is looked for beside `path`.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_bytes(
+    path: &Path,
+    bytes: &[u8],
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
     let (path, animation) = split_selector(path);
     let mut options = options.clone();
     options.animation = animation.or(options.animation);
     let file = path.display().to_string();
-    read(&path, &options).map_err(|fault| fault.in_file(&file))
+    read(&path, bytes, &options).map_err(|fault| fault.in_file(&file))
 }
 
-fn read(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFault> {
+fn read(path: &Path, bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportFault> {
     check_rate(options)?;
-    let bytes = read_bytes(path)?;
     let name = path
         .file_stem()
         .map_or("take".into(), |s| s.to_string_lossy().into_owned());
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let text = || String::from_utf8_lossy(&bytes);
-    match Format::of(extension.as_deref(), &bytes)? {
+    let text = || String::from_utf8_lossy(bytes);
+    match Format::of(extension.as_deref(), bytes)? {
         Format::Gltf => {
-            let file = gltf::GltfFile::parse(&bytes, &name, path.parent(), options)?;
+            let file = gltf::GltfFile::parse(bytes, &name, path.parent(), options)?;
             Ok(Imported {
                 takes: file.takes,
                 warnings: file.warnings,

@@ -1,15 +1,22 @@
-//! Addresses that the driver and the simulated servos work with; the same on every X series servo.
+//! Addresses that the driver and the simulated servos work with; the same on every X series servo, and on others as
+//! [`Layout::at`](super::Layout::at) says.
 //!
 //! They are looked up in the control table at compile time, so that each number stands in one place.
 
+use super::Register;
+use super::current::XM430;
 use super::x430::REGISTERS;
 
-/// The address of the register called `name`. A name that is not in the table does not compile.
+/// The address of the register called `name` in the table of a servo that reports load. A name that is not there does not compile.
 const fn of(name: &str) -> u16 {
+    find(&REGISTERS, name)
+}
+
+const fn find(table: &[Register], name: &str) -> u16 {
     let mut index = 0;
-    while index < REGISTERS.len() {
-        if same(REGISTERS[index].name, name) {
-            return REGISTERS[index].address;
+    while index < table.len() {
+        if same(table[index].name, name) {
+            return table[index].address;
         }
         index += 1;
     }
@@ -45,8 +52,12 @@ pub const SECONDARY_ID: u16 = of("secondary_id");
 pub const HOMING_OFFSET: u16 = of("homing_offset");
 /// Moving threshold.
 pub const MOVING_THRESHOLD: u16 = of("moving_threshold");
+/// Temperature limit; voltage limits, PWM limit and current limit follow.
+pub const TEMPERATURE_LIMIT: u16 = of("temperature_limit");
 /// PWM limit.
 pub const PWM_LIMIT: u16 = of("pwm_limit");
+/// Current limit; not on models that report load.
+pub const CURRENT_LIMIT: u16 = find(&XM430, "current_limit");
 /// Velocity limit.
 pub const VELOCITY_LIMIT: u16 = of("velocity_limit");
 /// Maximum and, 4 bytes on, minimum position limit.
@@ -67,14 +78,22 @@ pub const REGISTERED_INSTRUCTION: u16 = of("registered_instruction");
 pub const HARDWARE_ERROR_STATUS: u16 = of("hardware_error_status");
 /// Velocity I gain, the first of the gains.
 pub const VELOCITY_I_GAIN: u16 = of("velocity_i_gain");
+/// Position D gain.
+pub const POSITION_D_GAIN: u16 = of("position_d_gain");
+/// Position I gain.
+pub const POSITION_I_GAIN: u16 = of("position_i_gain");
 /// Position P gain.
 pub const POSITION_P_GAIN: u16 = of("position_p_gain");
+/// Feedforward second gain.
+pub const FEEDFORWARD_2ND_GAIN: u16 = of("feedforward_2nd_gain");
 /// Feedforward first gain, the last of the gains.
 pub const FEEDFORWARD_1ST_GAIN: u16 = of("feedforward_1st_gain");
 /// Bus watchdog.
 pub const BUS_WATCHDOG: u16 = of("bus_watchdog");
 /// Goal PWM.
 pub const GOAL_PWM: u16 = of("goal_pwm");
+/// Goal current; not on models that report load.
+pub const GOAL_CURRENT: u16 = find(&XM430, "goal_current");
 /// Goal velocity.
 pub const GOAL_VELOCITY: u16 = of("goal_velocity");
 /// Profile acceleration and, 4 bytes on, profile velocity.
@@ -91,7 +110,7 @@ pub const MOVING: u16 = of("moving");
 pub const MOVING_STATUS: u16 = of("moving_status");
 /// Present PWM.
 pub const PRESENT_PWM: u16 = of("present_pwm");
-/// Present load.
+/// Present load, or present current on models that report that.
 pub const PRESENT_LOAD: u16 = of("present_load");
 /// Present load (2 bytes), velocity (4), position (4), read in one go.
 pub const PRESENT_STATE: u16 = PRESENT_LOAD;

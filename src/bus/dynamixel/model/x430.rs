@@ -1,52 +1,16 @@
-//! Control table of the X430 servos: names, addresses, sizes, access, ranges, units.
+//! Control table of the XL430: names, addresses, sizes, access, ranges, units. The other X series tables differ from it in some rows.
 //!
 //! The one place where these facts stand; the driver, the commands and the simulated servos look them up.
 
-use super::{Access, Register};
+use super::Register;
+use super::table::{I16, I32, U8, U16, U32};
+pub(super) use super::table::{r, rw};
 
-const fn r(
-    name: &'static str,
-    address: u16,
-    size: u8,
-    min: i64,
-    max: i64,
-    unit: &'static str,
-) -> Register {
-    Register {
-        name,
-        address,
-        size,
-        access: Access::Read,
-        min,
-        max,
-        unit,
-    }
-}
-
-const fn rw(
-    name: &'static str,
-    address: u16,
-    size: u8,
-    min: i64,
-    max: i64,
-    unit: &'static str,
-) -> Register {
-    Register {
-        access: Access::ReadWrite,
-        ..r(name, address, size, min, max, unit)
-    }
-}
-
-const U8: i64 = 255;
-const U16: i64 = 65_535;
-const U32: i64 = 4_294_967_295;
-const I16: i64 = 32_767;
-const I32: i64 = 2_147_483_647;
-const PULSE: &str = "0.088 deg";
-const VELOCITY: &str = "0.229 rev/min";
+pub(super) const PULSE: &str = "0.088 deg";
+pub(super) const VELOCITY: &str = "0.229 rev/min";
 const ACCELERATION: &str = "214.577 rev/min2";
 const PWM: &str = "0.113 %";
-const VOLT: &str = "0.1 V";
+pub(super) const VOLT: &str = "0.1 V";
 
 /// Registers by address. The indirect blocks are there by their first register.
 pub(super) static REGISTERS: [Register; 52] = [

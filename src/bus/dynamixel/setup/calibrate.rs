@@ -178,9 +178,16 @@ mod tests {
 
     #[test]
     fn a_range_shorter_than_the_urdf_is_refused_with_both() {
-        let problem = range(&spec(2048, Direction::Forward), &moved(&[2048, 2400, 1700]), (-1.0, 1.0));
+        let problem = range(
+            &spec(2048, Direction::Forward),
+            &moved(&[2048, 2400, 1700]),
+            (-1.0, 1.0),
+        );
         let text = problem.expect_err("too short").to_string();
-        assert!(text.contains("-30.6 to 30.9 deg") && text.contains("-57.3 to 57.3"), "{text}");
+        assert!(
+            text.contains("-30.6 to 30.9 deg") && text.contains("-57.3 to 57.3"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -198,7 +205,10 @@ mod tests {
         let text = range(&spec(3900, Direction::Forward), &hand, (-0.9, 0.9))
             .expect_err("the turn ends")
             .to_string();
-        assert!(text.contains("3313 to 4487") && text.contains("horn"), "{text}");
+        assert!(
+            text.contains("3313 to 4487") && text.contains("horn"),
+            "{text}"
+        );
     }
 
     proptest! {

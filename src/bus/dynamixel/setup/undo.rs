@@ -57,13 +57,19 @@ impl UndoGroup {
     /// Where the servo answers after the last change.
     pub fn place(&self) -> Place {
         let last = self.entries.last();
-        last.map_or(Place { id: 1, baud: 57_600 }, |entry| {
+        last.map_or(
             Place {
-                id: entry.id,
-                baud: entry.baud,
-            }
-            .after(&entry.register, entry.new)
-        })
+                id: 1,
+                baud: 57_600,
+            },
+            |entry| {
+                Place {
+                    id: entry.id,
+                    baud: entry.baud,
+                }
+                .after(&entry.register, entry.new)
+            },
+        )
     }
 }
 
@@ -157,7 +163,8 @@ fn groups(text: &str) -> Result<Vec<UndoGroup>, String> {
                 id: last.id,
                 baud: last.baud,
             });
-            group.model == entry.model && (group.place() == place || from == Some(place) && repeats(group, &entry))
+            group.model == entry.model
+                && (group.place() == place || from == Some(place) && repeats(group, &entry))
         });
         match same {
             Some(group) => group.entries.push(entry),
@@ -205,13 +212,18 @@ mod tests {
     fn two_servos_out_of_the_box_are_two_groups() {
         let (_folder, file) = file();
         for id in [11, 12] {
-            file.note(entry(1, 57_600, "return_delay_time", 250, 0)).expect("written");
+            file.note(entry(1, 57_600, "return_delay_time", 250, 0))
+                .expect("written");
             file.note(entry(1, 57_600, "id", 1, id)).expect("written");
-            file.note(entry(id as u8, 57_600, "baud_rate", 1, 3)).expect("written");
+            file.note(entry(id as u8, 57_600, "baud_rate", 1, 3))
+                .expect("written");
         }
         let groups = file.groups().expect("a good file");
         let places: Vec<Place> = groups.iter().map(UndoGroup::place).collect();
-        let at = |id| Place { id, baud: 1_000_000 };
+        let at = |id| Place {
+            id,
+            baud: 1_000_000,
+        };
         assert_eq!(places, [at(11), at(12)]);
         assert!(groups.iter().all(|g| g.entries.len() == 3), "{groups:?}");
         file.note_undone(11).expect("written");
@@ -237,6 +249,9 @@ mod tests {
         assert_eq!(file.groups().expect("a torn line").len(), 1);
         fs::write(&file.path, format!("{text}{{\"id\":1}}\n{text}")).expect("written");
         let error = file.groups().expect_err("a bad line").to_string();
-        assert!(error.contains("line 2") && error.contains("undo.jsonl"), "{error}");
+        assert!(
+            error.contains("line 2") && error.contains("undo.jsonl"),
+            "{error}"
+        );
     }
 }

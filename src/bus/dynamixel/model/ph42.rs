@@ -1,0 +1,80 @@
+//! Control table of the PH42-020-S300: RAM begins at 512, position is finer and 0 in the middle, current is in mA.
+
+use super::Register;
+use super::table::{I16, I32, U8, U16, U32, r, rw};
+
+const PULSE: &str = "1/607500 rev";
+const VELOCITY: &str = "0.01 rev/min";
+const ACCELERATION: &str = "1 rev/min2";
+const PWM: &str = "1/2009";
+const MA: &str = "1 mA";
+const VOLT: &str = "0.1 V";
+
+/// Registers by address. The indirect blocks are there by their first register.
+pub(super) static PH42: [Register; 65] = [
+    r("model_number", 0, 2, 0, U16, ""),
+    r("model_information", 2, 4, 0, U32, ""),
+    r("firmware_version", 6, 1, 0, U8, ""),
+    rw("id", 7, 1, 0, 252, ""),
+    rw("baud_rate", 8, 1, 0, 9, ""),
+    rw("return_delay_time", 9, 1, 0, 254, "2 us"),
+    rw("drive_mode", 10, 1, 0, 1, ""),
+    rw("operating_mode", 11, 1, 0, 16, ""),
+    rw("secondary_id", 12, 1, 0, U8, ""),
+    rw("protocol_type", 13, 1, 2, 10, ""),
+    rw("homing_offset", 20, 4, -I32, I32, PULSE),
+    rw("moving_threshold", 24, 4, 0, 2920, VELOCITY),
+    rw("temperature_limit", 31, 1, 0, 100, "C"),
+    rw("max_voltage_limit", 32, 2, 150, 350, VOLT),
+    rw("min_voltage_limit", 34, 2, 150, 350, VOLT),
+    rw("pwm_limit", 36, 2, 0, 2009, PWM),
+    rw("current_limit", 38, 2, 0, 4500, MA),
+    rw("acceleration_limit", 40, 4, 0, 4_306_173, ACCELERATION),
+    rw("velocity_limit", 44, 4, 0, 2920, VELOCITY),
+    rw("max_position_limit", 48, 4, -303_750, 303_750, PULSE),
+    rw("min_position_limit", 52, 4, -303_750, 303_750, PULSE),
+    rw("external_port_mode_1", 56, 1, 0, 3, ""),
+    rw("external_port_mode_2", 57, 1, 0, 3, ""),
+    rw("external_port_mode_3", 58, 1, 0, 3, ""),
+    rw("external_port_mode_4", 59, 1, 0, 3, ""),
+    rw("startup_configuration", 60, 1, 0, 3, ""),
+    rw("shutdown", 63, 1, 0, U8, ""),
+    rw("indirect_address_1", 168, 2, 512, 1023, ""),
+    rw("torque_enable", 512, 1, 0, 1, ""),
+    rw("led_red", 513, 1, 0, U8, ""),
+    rw("led_green", 514, 1, 0, U8, ""),
+    rw("led_blue", 515, 1, 0, U8, ""),
+    rw("status_return_level", 516, 1, 0, 2, ""),
+    r("registered_instruction", 517, 1, 0, 1, ""),
+    r("hardware_error_status", 518, 1, 0, U8, ""),
+    rw("velocity_i_gain", 524, 2, 0, 32_767, ""),
+    rw("velocity_p_gain", 526, 2, 0, 32_767, ""),
+    rw("position_d_gain", 528, 2, 0, 32_767, ""),
+    rw("position_i_gain", 530, 2, 0, 32_767, ""),
+    rw("position_p_gain", 532, 2, 0, 32_767, ""),
+    rw("feedforward_2nd_gain", 536, 2, 0, 32_767, ""),
+    rw("feedforward_1st_gain", 538, 2, 0, 32_767, ""),
+    rw("bus_watchdog", 546, 1, -1, 127, "20 ms"),
+    rw("goal_pwm", 548, 2, -2009, 2009, PWM),
+    rw("goal_current", 550, 2, -4500, 4500, MA),
+    rw("goal_velocity", 552, 4, -2920, 2920, VELOCITY),
+    rw("profile_acceleration", 556, 4, 0, 4_306_173, ACCELERATION),
+    rw("profile_velocity", 560, 4, 0, 2920, VELOCITY),
+    rw("goal_position", 564, 4, -I32, I32, PULSE),
+    r("realtime_tick", 568, 2, 0, 32_767, "ms"),
+    r("moving", 570, 1, 0, 1, ""),
+    r("moving_status", 571, 1, 0, U8, ""),
+    r("present_pwm", 572, 2, -I16, I16, PWM),
+    r("present_current", 574, 2, -I16, I16, MA),
+    r("present_velocity", 576, 4, -I32, I32, VELOCITY),
+    r("present_position", 580, 4, -I32, I32, PULSE),
+    r("velocity_trajectory", 584, 4, -I32, I32, VELOCITY),
+    r("position_trajectory", 588, 4, -I32, I32, PULSE),
+    r("present_input_voltage", 592, 2, 0, U16, VOLT),
+    r("present_temperature", 594, 1, 0, U8, "C"),
+    rw("external_port_data_1", 600, 2, 0, 4095, ""),
+    rw("external_port_data_2", 602, 2, 0, 4095, ""),
+    rw("external_port_data_3", 604, 2, 0, 4095, ""),
+    rw("external_port_data_4", 606, 2, 0, 4095, ""),
+    r("backup_ready", 878, 1, 0, 1, ""),
+];
