@@ -164,9 +164,7 @@ fn what_was_written_is_undone_one_servo_at_a_time() {
     undo(&["--id", "12"]).expect(0, &["id 1 at 57600 baud"]);
     let slow = format!("{bus}@57600");
     for (register, value) in [("return_delay_time", 250), ("max_position_limit", 4095)] {
-        let told = bench.run(&["bus", "read", &slow, "1", register, "--json"]);
-        let row: serde_json::Value = serde_json::from_str(&told.out).expect("a row");
-        assert_eq!(row["value"], value, "{register}");
+        assert_eq!(bench.register_at(&slow, 1, register), value, "{register}");
     }
     // The other one would now come to the same place: refused, and it stays whole.
     undo(&["--id", "11"]).expect(3, &["taken", "another servo answers there"]);

@@ -107,11 +107,21 @@ impl Bench {
     /// A register of servo `id` at 1 Mbaud.
     #[track_caller]
     pub fn register(&self, id: u8, name: &str) -> i64 {
+        self.register_at(&self.bus, id, name)
+    }
+
+    /// A register of servo `id` on `bus`. A machine that is busy otherwise may take more than one try.
+    #[track_caller]
+    pub fn register_at(&self, bus: &str, id: u8, name: &str) -> i64 {
         let id = id.to_string();
-        let told = self.run(&["bus", "read", &self.bus, &id, name, "--json"]);
-        let row: serde_json::Value = serde_json::from_str(&told.out)
-            .unwrap_or_else(|e| panic!("{name} of servo {id}: {e}; {told:?}"));
-        row["value"].as_i64().expect("a number")
+        let begin = Instant::now();
+        loop {
+            let told = self.run(&["bus", "read", bus, &id, name, "--json"]);
+            if let Ok(row) = serde_json::from_str::<serde_json::Value>(&told.out) {
+                return row["value"].as_i64().expect("a number");
+            }
+            assert!(begin.elapsed() < AT_MOST, "{name} of servo {id}: {told:?}");
+        }
     }
 
     /// Present position of servo `id`, in pulses, once it is within `slack` of `pulse`.
