@@ -11,7 +11,7 @@ use crate::bus::dynamixel::setup::{
     Change, ChooseError, Found, Halt, Place, SetupError, Sweep, UndoEntry, UndoFile, choose,
     commission, plan, sweep, undo,
 };
-use crate::bus::dynamixel::{Client, Model};
+use crate::bus::dynamixel::{Client, ClientError, Model};
 use crate::cli::{ExitStatus, Failure};
 use clap::Args;
 use handwave_dynamixel::baud::RATES;
@@ -175,7 +175,7 @@ impl Bench<'_> {
                 .find(|f| f.ping.id == place.id && !f.garbled);
             let head = format!("\n{} of {}: {}", number + 1, todo.len(), post.name);
             if let Some(found) = here {
-                if self.changes(found, post)?.is_empty() {
+                if self.changes(found, post).map_err(failure)?.is_empty() {
                     say(out, format_args!("{head} is set up already"))?;
                     continue;
                 }
@@ -265,7 +265,15 @@ impl Bench<'_> {
                 self.args.bus
             )));
         }
-        let changes = self.changes(found, post)?;
+        let changes = match self.changes(found, post) {
+            Ok(changes) => changes,
+            Err(SetupError::Client(ClientError::Timeout { .. })) => {
+                return Ok(Outcome::Again(
+                    "it has fallen silent meanwhile. Check its cable".into(),
+                ));
+            }
+            Err(error) => return Err(failure(error)),
+        };
         if changes.is_empty() {
             say(out, format_args!("  {} is as it should be", post.name))?;
             return Ok(Outcome::Done);
@@ -317,19 +325,17 @@ impl Bench<'_> {
         Ok(swept)
     }
 
-    fn changes(&mut self, found: &Found, post: &Post) -> Result<Vec<Change>, Failure> {
-        let model = Model::by_number(found.ping.model).ok_or_else(|| {
-            Failure::input(SetupError::UnknownModel {
-                id: found.ping.id,
-                number: found.ping.model,
-            })
-        })?;
-        self.client.set_baud(found.baud)?;
+    fn changes(&mut self, found: &Found, post: &Post) -> Result<Vec<Change>, SetupError> {
         let place = Place {
             id: found.ping.id,
             baud: found.baud,
         };
-        plan(&mut *self.client, place, model, &post.wanted).map_err(failure)
+        let model = Model::by_number(found.ping.model).ok_or(SetupError::UnknownModel {
+            id: place.id,
+            number: found.ping.model,
+        })?;
+        self.client.set_baud(place.baud)?;
+        plan(&mut *self.client, place, model, &post.wanted)
     }
 
     fn write(&mut self, place: Place, model: &str, changes: &[Change]) -> Result<Place, Halt> {
@@ -375,8 +381,9 @@ impl Bench<'_> {
         );
         match &halt.reason {
             SetupError::Stopped => Err(interrupted(text)),
-            SetupError::Client(crate::bus::dynamixel::ClientError::Port(_))
-            | SetupError::File { .. } => Err(Failure::bus(text)),
+            SetupError::Client(ClientError::Port(_)) | SetupError::File { .. } => {
+                Err(Failure::bus(text))
+            }
             _ => Ok(Outcome::Again(text)),
         }
     }
