@@ -91,6 +91,9 @@ pub struct RunOptions {
     /// (`handwave sim dynamixel --list-faults`)
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
+    /// Where chance begins, for faults
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
     /// Load changed gesture files while the run goes on (with live sources it does so by itself)
     #[arg(long)]
     watch: bool,
@@ -296,6 +299,9 @@ fn session(
             other => Failure::input(other),
         })?;
     let line = wire.line;
+    if let Some(line) = &line {
+        line.lock().set_seed(options.seed);
+    }
     Ok(Session {
         puppet,
         bus: wire.bus,
@@ -313,6 +319,23 @@ fn session(
     })
 }
 
+/// What was injected, one line a fault: read beside what was noticed of it.
+fn injected(options: &RunOptions, character: &Character) -> String {
+    let faults = options.fault.iter().filter_map(|text| text.parse().ok());
+    faults
+        .map(|fault: FaultSpec| {
+            let joint = character
+                .servos
+                .iter()
+                .find(|s| Some(s.id) == fault.servo());
+            let who = joint.map_or("whole bus".to_owned(), |s| {
+                format!("servo {} (joint {})", s.id, s.joint)
+            });
+            format!("injected      {who} {fault}\n")
+        })
+        .collect()
+}
+
 /// Prints the summary and turns the ending into an exit code.
 fn conclude(
     options: &RunOptions,
@@ -321,16 +344,14 @@ fn conclude(
     written: Result<(), String>,
     character: &Character,
 ) -> Result<ExitStatus, Failure> {
+    let injected = injected(options, character);
     if options.json {
-        say(format_args!(
-            "{}",
-            summary::to_json(&report, slides, character)
-        ));
+        let mut summary = summary::to_json(&report, slides, character);
+        summary["injected"] = options.fault.clone().into();
+        say(format_args!("{summary}"));
     } else {
-        say(format_args!(
-            "{}",
-            summary::to_text(&report, slides, character).trim_end()
-        ));
+        let text = summary::to_text(&report, slides, character) + &injected;
+        say(format_args!("{}", text.trim_end()));
     }
     let end = |status, message: String| Failure { status, message };
     // The gravest first: what became of the robot outranks what was wrong with a file.

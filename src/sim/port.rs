@@ -14,35 +14,50 @@ pub struct SimPort {
     line: SharedLine,
     clock: Arc<dyn Clock>,
     baud: u32,
+    /// Which of the adapter's names this was opened under; 0 is the first.
+    adapter: u32,
+    name: String,
 }
 
 impl SimPort {
-    /// A port at `baud_bps` on `line`. Keep a clone of the line to look at its servos.
+    /// A port at `baud_bps` on `line`, under the name that the adapter has now: `sim`, or `sim.1` once a
+    /// fault has brought it back so. Keep a clone of the line to look at its servos.
     pub fn new(line: SharedLine, clock: Arc<dyn Clock>, baud_bps: u32) -> Self {
+        let adapter = line.lock().adapter_name(clock.now());
         Self {
             line,
             clock,
             baud: baud_bps,
+            adapter,
+            name: match adapter {
+                0 => "sim".to_owned(),
+                number => format!("sim.{number}"),
+            },
         }
     }
 
     fn check(&self, now: Time) -> Result<(), PortError> {
         let mut line = self.line.lock();
-        if !line.is_unplugged(now) {
+        let there = line.adapter_name(now);
+        let reason = if line.is_unplugged(now) {
+            "unplugged by an injected fault".to_owned()
+        } else if there != self.adapter {
+            format!("an injected fault has plugged it in again as sim.{there}")
+        } else {
             return Ok(());
-        }
+        };
         line.advance(now);
         line.clear();
         Err(PortError::Gone {
-            port: self.name().to_owned(),
-            reason: "unplugged by an injected fault".to_owned(),
+            port: self.name.clone(),
+            reason,
         })
     }
 }
 
 impl Port for SimPort {
     fn name(&self) -> &str {
-        "sim"
+        &self.name
     }
 
     fn baud(&self) -> u32 {
