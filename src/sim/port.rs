@@ -23,17 +23,24 @@ impl SimPort {
     /// A port at `baud_bps` on `line`, under the name that the adapter has now: `sim`, or `sim.1` once a
     /// fault has brought it back so. Keep a clone of the line to look at its servos.
     pub fn new(line: SharedLine, clock: Arc<dyn Clock>, baud_bps: u32) -> Self {
-        let adapter = line.lock().adapter_name(clock.now());
-        Self {
+        let mut port = Self {
             line,
             clock,
             baud: baud_bps,
-            adapter,
-            name: match adapter {
-                0 => "sim".to_owned(),
-                number => format!("sim.{number}"),
-            },
-        }
+            adapter: 0,
+            name: String::new(),
+        };
+        port.find();
+        port
+    }
+
+    /// Takes the name that the adapter has now.
+    fn find(&mut self) {
+        self.adapter = self.line.lock().adapter_name(self.clock.now());
+        self.name = match self.adapter {
+            0 => "sim".to_owned(),
+            number => format!("sim.{number}"),
+        };
     }
 
     fn check(&self, now: Time) -> Result<(), PortError> {
