@@ -21,7 +21,10 @@ fn is_borne(fault: &str, at_most_s: f64) {
     played.expect_others_to_move();
     for seen in played.faults() {
         let lasted_s = seen.to_s - seen.from_s;
-        assert!(seen.kind == "silent" && lasted_s <= at_most_s + 1e-9, "{fault}: {seen:?}");
+        assert!(
+            seen.kind == "silent" && lasted_s <= at_most_s + 1e-9,
+            "{fault}: {seen:?}"
+        );
     }
 }
 
@@ -82,7 +85,10 @@ fn an_adapter_unplugged_for_good_ends_the_run_within_two_seconds() {
         let played = play(&[spec], &[3]);
         println!("{}: {}", played.line(), played.ended.err.trim());
         let cycles = played.targets.rows.len();
-        assert!((1599..=2000).contains(&cycles), "{spec}: ended after {cycles} cycles");
+        assert!(
+            (1599..=2000).contains(&cycles),
+            "{spec}: ended after {cycles} cycles"
+        );
         assert!(
             played.ended.err.contains("unplugged") || played.ended.err.contains("plugged it in"),
             "{}",
@@ -105,7 +111,8 @@ fn every_fault_in_the_list_has_a_scenario_here() {
     assert!(names.len() >= 11, "{names:?}");
     for name in names {
         let found = ["\"", "=", "@"].iter().any(|end| {
-            source.contains(&format!("\"{name}{end}")) || source.contains(&format!("bus:{name}{end}"))
+            source.contains(&format!("\"{name}{end}"))
+                || source.contains(&format!("bus:{name}{end}"))
         });
         assert!(found, "no scenario for {name}");
     }

@@ -13,7 +13,9 @@ use std::time::Duration;
 
 fn push(host: &Host, id: u8, torque_nm: f64) {
     let mut line = host.line.lock();
-    line.servo_mut(id).expect("on the line").set_external_torque(torque_nm);
+    line.servo_mut(id)
+        .expect("on the line")
+        .set_external_torque(torque_nm);
 }
 
 /// Hardware error, temperature (degrees) and voltage (0.1 V) as read over the wire.
@@ -37,7 +39,10 @@ fn a_robot_that_stands_for_ten_minutes_stays_cool_and_on() {
         assert_eq!(error, 0, "servo {id} at {celsius} degrees, {decivolts} dV");
         assert!((34..50).contains(&celsius), "servo {id}: {celsius} degrees");
         // Twelve holding a fifth draw about 1.2 A through 0.1 ohm.
-        assert!((108..111).contains(&decivolts), "servo {id}: {decivolts} dV");
+        assert!(
+            (108..111).contains(&decivolts),
+            "servo {id}: {decivolts} dV"
+        );
         assert_eq!(host.read(id, 64, 1).data, [1], "torque of servo {id}");
     }
 }
@@ -58,7 +63,10 @@ fn a_blocked_leg_trips_overload_in_seconds_and_a_free_one_does_not() {
         }
     }
     let tripped_s = tripped_s.expect("overload within 5 s");
-    assert!((1.0..4.0).contains(&tripped_s), "overload after {tripped_s:.1} s");
+    assert!(
+        (1.0..4.0).contains(&tripped_s),
+        "overload after {tripped_s:.1} s"
+    );
     assert_eq!(host.read(1, 64, 1).data, [0], "shut down");
     assert_eq!(felt(&mut host, 2).0, 0, "the other one went its way");
 }
@@ -77,12 +85,23 @@ fn a_strained_servo_grows_hot_until_its_temperature_limit_and_stays_latched_unti
         seconds += 1.0;
     }
     let (error, celsius, _) = felt(&mut host, 1);
-    assert!((20.0..400.0).contains(&seconds), "{celsius} degrees after {seconds} s");
-    assert_eq!((error & 0x04, host.read(1, 64, 1).data[0]), (0x04, 0), "overheating, torque off");
+    assert!(
+        (20.0..400.0).contains(&seconds),
+        "{celsius} degrees after {seconds} s"
+    );
+    assert_eq!(
+        (error & 0x04, host.read(1, 64, 1).data[0]),
+        (0x04, 0),
+        "overheating, torque off"
+    );
     assert!((45..47).contains(&celsius), "{celsius} degrees");
     push(&host, 1, 0.0);
     host.wait(300.0);
-    assert_eq!(felt(&mut host, 1).0 & 0x04, 0x04, "cool again, and latched still");
+    assert_eq!(
+        felt(&mut host, 1).0 & 0x04,
+        0x04,
+        "cool again, and latched still"
+    );
     host.tell(1, Instruction::Reboot);
     host.wait(0.3);
     assert_eq!(felt(&mut host, 1).0, 0);
@@ -97,7 +116,9 @@ fn what_all_draw_lowers_the_supply_of_each() {
         host.write(id, 11, &[16]);
         host.write(id, 64, &[1]);
         // Full drive against a shaft that cannot give way.
-        let fault = format!("{id}:stuck@0s").parse().expect("a good specification");
+        let fault = format!("{id}:stuck@0s")
+            .parse()
+            .expect("a good specification");
         host.line.lock().inject(fault).expect("on the line");
     }
     host.wait(0.5);
@@ -133,12 +154,17 @@ fn an_encoder_that_jumps_drives_the_shaft_and_a_frozen_one_does_not_tell() {
     host.wait(0.48);
     assert_eq!(host.read_i32(1, 132), 2048);
     // The jump itself, before the motor has answered it.
-    host.clock.sleep_until(handwave::base::Time::from_secs(0.6005));
+    host.clock
+        .sleep_until(handwave::base::Time::from_secs(0.6005));
     host.wait(1.0);
     let settled = host.read_i32(1, 132);
     assert!((2040..=2056).contains(&settled), "driven back to {settled}");
     host.wait(0.5);
-    assert!((host.pulses(1) - 2048.0).abs() < 5.0, "after it {}", host.pulses(1));
+    assert!(
+        (host.pulses(1) - 2048.0).abs() < 5.0,
+        "after it {}",
+        host.pulses(1)
+    );
 
     let mut host = Host::new(1).fault("1:frozen-position@0.5s..1.5s");
     host.write(1, 64, &[1]);
@@ -147,7 +173,11 @@ fn an_encoder_that_jumps_drives_the_shaft_and_a_frozen_one_does_not_tell() {
     host.sync_goals(&[(1, 2500)]);
     host.wait(0.5);
     assert_eq!(host.read_i32(1, 132), 2048, "frozen");
-    assert!((host.pulses(1) - 2500.0).abs() < 5.0, "it went to {}", host.pulses(1));
+    assert!(
+        (host.pulses(1) - 2500.0).abs() < 5.0,
+        "it went to {}",
+        host.pulses(1)
+    );
     host.wait(0.6);
     assert!((host.read_i32(1, 132) - 2500).abs() < 5, "thawed");
 }
@@ -162,14 +192,22 @@ fn a_noisy_encoder_shows_noise_and_holds_still() {
             host.read_i32(1, 132)
         })
         .collect();
-    let (low, high) = (seen.iter().min().expect("some"), seen.iter().max().expect("some"));
-    assert!((2008..2020).contains(low) && (2076..=2088).contains(high), "{low}..{high}");
+    let (low, high) = (
+        seen.iter().min().expect("some"),
+        seen.iter().max().expect("some"),
+    );
+    assert!(
+        (2008..2020).contains(low) && (2076..=2088).contains(high),
+        "{low}..{high}"
+    );
     assert_eq!(host.pulses(1), 2048.0);
 }
 
 #[test]
 fn a_deaf_servo_answers_and_obeys_nothing_and_one_that_refuses_says_so() {
-    let mut host = Host::new(1).fault("1:deaf@0s..0.5s").fault("1:refuses=3@0.5s..1s");
+    let mut host = Host::new(1)
+        .fault("1:deaf@0s..0.5s")
+        .fault("1:refuses=3@0.5s..1s");
     assert_eq!(host.write(1, 65, &[1]), 0);
     assert_eq!(host.read(1, 65, 1).data, [0], "the LED stays dark");
     host.wait(0.5);
@@ -184,7 +222,9 @@ fn a_deaf_servo_answers_and_obeys_nothing_and_one_that_refuses_says_so() {
 
 #[test]
 fn torque_can_be_lost_without_a_restart_and_a_watchdog_can_trip_without_cause() {
-    let mut host = Host::new(2).fault("1:torque-loss@0.5s").fault("2:watchdog-trip@0.5s");
+    let mut host = Host::new(2)
+        .fault("1:torque-loss@0.5s")
+        .fault("2:watchdog-trip@0.5s");
     for id in [1, 2] {
         host.write_u32(id, 112, 77);
         host.write(id, 64, &[1]);
@@ -201,7 +241,11 @@ fn torque_can_be_lost_without_a_restart_and_a_watchdog_can_trip_without_cause() 
 #[test]
 fn a_watchdog_that_takes_the_homing_offset_twice_runs_off() {
     // In extended mode by its homing offset, in position mode no further than its limits.
-    for (mode, offset, expected) in [(4, 700, 2048 + 700 + 700), (4, 0, 2048 + 1000), (3, 0, 3000)] {
+    for (mode, offset, expected) in [
+        (4, 700, 2048 + 700 + 700),
+        (4, 0, 2048 + 1000),
+        (3, 0, 3000),
+    ] {
         let mut host = Host::new(1).fault("1:watchdog-runaway@0s");
         host.write(1, 11, &[mode]);
         host.write_u32(1, 20, offset);
@@ -228,22 +272,34 @@ fn replies_can_be_cut_doubled_garbled_and_under_another_id() {
         ("wrong-id=9", &[9]),
     ] {
         let mut host = Host::new(2).fault(&format!("1:{fault}@0s"));
-        let seen: Vec<u8> = host.tell(1, Instruction::Ping).iter().map(|a| a.id).collect();
+        let seen: Vec<u8> = host
+            .tell(1, Instruction::Ping)
+            .iter()
+            .map(|a| a.id)
+            .collect();
         assert_eq!(seen, ids, "{fault}");
         host.wait(0.02);
-        assert_eq!(host.tell(2, Instruction::Ping).len(), 1, "{fault}: the other one");
+        assert_eq!(
+            host.tell(2, Instruction::Ping).len(),
+            1,
+            "{fault}: the other one"
+        );
     }
 }
 
 #[test]
 fn an_adapter_keeps_bytes_back_for_a_while_and_loses_some() {
-    let mut host = Host::new(1).fault("bus:latency@0.5s..1s").fault("bus:lost-bytes=0.05@2s..3s");
+    let mut host = Host::new(1)
+        .fault("bus:latency@0.5s..1s")
+        .fault("bus:lost-bytes=0.05@2s..3s");
     let took_us = |host: &mut Host| {
         let mut ping = [0; 16];
         let bytes = Instruction::Ping.encode(1, &mut ping).expect("room");
         let start = host.clock.now();
         host.port.write_all(bytes).expect("a port that is there");
-        let read = host.port.read(&mut [0; 14], 14, start + Duration::from_secs(1));
+        let read = host
+            .port
+            .read(&mut [0; 14], 14, start + Duration::from_secs(1));
         assert_eq!(read.expect("a port that is there"), 14);
         (host.clock.now().secs_since(start) * 1e6).round() as i64
     };

@@ -30,9 +30,19 @@ enum Act {
 
 fn any_fault() -> impl Strategy<Value = String> {
     let target = prop_oneof![Just(None), (1..=SERVOS).prop_map(Some)];
-    (target, 0..100_usize, 0.0..=1.0_f64, 0.0..0.3_f64, prop::option::of(0.001..0.3_f64)).prop_map(
-        |(target, pick, share, from_s, lasts_s)| {
-            let scope = if target.is_some() { Scope::Servo } else { Scope::Bus };
+    (
+        target,
+        0..100_usize,
+        0.0..=1.0_f64,
+        0.0..0.3_f64,
+        prop::option::of(0.001..0.3_f64),
+    )
+        .prop_map(|(target, pick, share, from_s, lasts_s)| {
+            let scope = if target.is_some() {
+                Scope::Servo
+            } else {
+                Scope::Bus
+            };
             let rows: Vec<_> = FAULTS.iter().filter(|row| row.scope == scope).collect();
             let row = rows[pick % rows.len()];
             let target = target.map_or("bus".to_owned(), |id| id.to_string());
@@ -41,20 +51,25 @@ fn any_fault() -> impl Strategy<Value = String> {
             });
             let until = lasts_s.map_or(String::new(), |s| format!("..{}s", from_s + s));
             format!("{target}:{}{value}@{from_s}s{until}", row.name)
-        },
-    )
+        })
 }
 
 fn any_act() -> impl Strategy<Value = Act> {
     let instruction = prop::sample::select(vec![
-        0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08, 0x10, 0x20, 0x55, 0x82, 0x83, 0x8A, 0x92, 0x93, 0x9A, 0x77,
+        0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08, 0x10, 0x20, 0x55, 0x82, 0x83, 0x8A, 0x92, 0x93,
+        0x9A, 0x77,
     ]);
     let id = prop_oneof![4 => 0..=SERVOS, 2 => Just(254_u8), 1 => any::<u8>()];
     // Parameters that often name a register and a small length, else anything.
-    let register = prop::sample::select(vec![7_u8, 8, 11, 20, 64, 68, 98, 100, 104, 108, 112, 116, 126, 132, 168, 224]);
-    let sensible = (register, 0..12_u8, prop::collection::vec(any::<u8>(), 0..24)).prop_map(|(address, length, rest)| {
-        [vec![address, 0, length, 0], rest].concat()
-    });
+    let register = prop::sample::select(vec![
+        7_u8, 8, 11, 20, 64, 68, 98, 100, 104, 108, 112, 116, 126, 132, 168, 224,
+    ]);
+    let sensible = (
+        register,
+        0..12_u8,
+        prop::collection::vec(any::<u8>(), 0..24),
+    )
+        .prop_map(|(address, length, rest)| [vec![address, 0, length, 0], rest].concat());
     let params = prop_oneof![3 => sensible, 1 => prop::collection::vec(any::<u8>(), 0..40)];
     prop_oneof![
         6 => (id, instruction, params).prop_map(|(id, code, params)| Act::Frame(id, code, params)),
@@ -66,13 +81,19 @@ fn any_act() -> impl Strategy<Value = Act> {
 }
 
 /// Plays `acts` and returns what was read and when, and where the shafts are in the end.
-fn play(faults: &[String], acts: &[Act], seed: u64, paced: bool) -> (Vec<(Time, Vec<u8>)>, Vec<f64>) {
+fn play(
+    faults: &[String],
+    acts: &[Act],
+    seed: u64,
+    paced: bool,
+) -> (Vec<(Time, Vec<u8>)>, Vec<f64>) {
     let options = LineOptions {
         paced,
         seed,
         ..LineOptions::default()
     };
-    let mut line = Line::commissioned(&XL430_W250, 1..=SERVOS, 1_000_000, options).expect("a known rate");
+    let mut line =
+        Line::commissioned(&XL430_W250, 1..=SERVOS, 1_000_000, options).expect("a known rate");
     for spec in faults {
         let fault: FaultSpec = spec.parse().unwrap_or_else(|e| panic!("{e}"));
         line.inject(fault).expect("on the line");
@@ -87,7 +108,7 @@ fn play(faults: &[String], acts: &[Act], seed: u64, paced: bool) -> (Vec<(Time, 
             Act::Frame(id, code, params) => {
                 let mut buf = [0; 256];
                 let mut writer = FrameWriter::new(&mut buf, *id, *code);
-                writer.bytes(params);
+                writer.extend(params);
                 if let Ok(bytes) = writer.finish() {
                     // A port that is unplugged says so; the host goes on.
                     let _unplugged = port.write_all(bytes);
@@ -113,7 +134,8 @@ fn play(faults: &[String], acts: &[Act], seed: u64, paced: bool) -> (Vec<(Time, 
     clock.sleep_until(end);
     let mut line = line.lock();
     line.advance(end);
-    let shafts = (1..=SERVOS).map(|label| line.servo(label).expect("on the line").position_pulses());
+    let shafts =
+        (1..=SERVOS).map(|label| line.servo(label).expect("on the line").position_pulses());
     (heard, shafts.collect())
 }
 
