@@ -10,6 +10,7 @@ pub mod limits;
 pub mod motion;
 pub mod program;
 pub mod recipe;
+pub mod scenario;
 pub mod simulator;
 pub mod spectrum;
 pub mod targets;
