@@ -321,15 +321,13 @@ fn a_bench_moves_nothing_and_leaves_torque_alone() {
         .write(2, 116, &four(2100))
         .expect("a goal 40 counts on");
 
-    let goals_written: Vec<i32>;
-    let present_before: Vec<f64>;
-    {
+    let present_before: Vec<f64> = {
         let mut line = line.lock();
         line.advance(clock.now());
-        present_before = (1..=5)
+        (1..=5)
             .map(|id| line.servo(id).expect("on the line").position_pulses())
-            .collect();
-    }
+            .collect()
+    };
     let report = rig.bench(Reads::Fast, 1.0);
     assert_eq!(report.errors().total(), 0, "{report:?}");
     let mut master = Master::new(
@@ -351,13 +349,9 @@ fn a_bench_moves_nothing_and_leaves_torque_alone() {
         master.read(id, 64, &mut on).expect("an answer");
         torque[place] = on[0];
     }
-    goals_written = goals.to_vec();
     assert_eq!(torque, [0, 1, 1, 0, 1], "torque after the bench");
-    assert_eq!(
-        goals_written[0], 2048,
-        "without torque: the present position"
-    );
-    assert_eq!(goals_written[1], 2100, "held: the goal it had");
+    assert_eq!(goals[0], 2048, "without torque: the present position");
+    assert_eq!(goals[1], 2100, "held: the goal it had");
     let moved: Vec<f64> = (1..=5)
         .map(|id| {
             line.lock()

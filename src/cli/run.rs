@@ -96,6 +96,9 @@ pub struct RunOptions {
     /// (`handwave sim dynamixel --list-faults`)
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
+    /// Where chance begins, for faults
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
     /// Load changed gesture files while the run goes on (with live sources it does so by itself)
     #[arg(long)]
     watch: bool,
@@ -346,6 +349,11 @@ fn session(
     };
     keeping.begin(character, source.reader.header(), &how)?;
     let line = wire.line;
+    if let Some(line) = &line {
+        for line in line.each() {
+            line.lock().set_seed(options.seed);
+        }
+    }
     Ok(Session {
         puppet,
         bus,
@@ -364,6 +372,23 @@ fn session(
     })
 }
 
+/// What was injected, one line a fault: read beside what was noticed of it.
+fn injected(options: &RunOptions, character: &Character) -> String {
+    let faults = options.fault.iter().filter_map(|text| text.parse().ok());
+    faults
+        .map(|fault: FaultSpec| {
+            let joint = character
+                .servos
+                .iter()
+                .find(|s| Some(s.id) == fault.servo());
+            let who = joint.map_or("whole bus".to_owned(), |s| {
+                format!("servo {} (joint {})", s.id, s.joint)
+            });
+            format!("injected      {who} {fault}\n")
+        })
+        .collect()
+}
+
 /// Prints the summary and turns the ending into an exit code.
 fn conclude(
     options: &RunOptions,
@@ -373,13 +398,15 @@ fn conclude(
     kept: &Kept,
     character: &Character,
 ) -> Result<ExitStatus, Failure> {
+    let injected = injected(options, character);
     if options.json {
         let mut summary = summary::to_json(&report, slides, character);
         summary["recording"] = keeping::to_json(kept);
+        summary["injected"] = options.fault.clone().into();
         say(format_args!("{summary}"));
     } else {
-        let summary = summary::to_text(&report, slides, character) + &keeping::lines(kept);
-        say(format_args!("{}", summary.trim_end()));
+        let text = summary::to_text(&report, slides, character) + &injected + &keeping::lines(kept);
+        say(format_args!("{}", text.trim_end()));
     }
     let end = |status, message: String| Failure { status, message };
     // The gravest first: what became of the robot outranks what was wrong with a file.

@@ -9,6 +9,7 @@ use crate::sim::fault::FAULTS;
 use crate::sim::line::SharedLine;
 use crate::sim::models::{self, MODELS};
 use crate::sim::table::Device;
+use crate::sim::trace::Trace;
 use crate::sim::{FaultSpec, Line, LineOptions, PtyServer, Servo};
 use clap::{Args, Subcommand};
 use handwave_dynamixel::{MAX_ID, baud};
@@ -40,7 +41,9 @@ Servos start as commissioned: return delay 0, status return level 2, position mo
 A servo set to another baud rate than the client's port is silent. A reboot takes a quarter of a second.
 FIRMWARE is a version, as in xl330-m288@47: fast reads need 45 (46 on the 330 size; MX and PH42 have none), a bus watchdog 38,
 and the indirect data of the 330 size lies at 224 before 52, at 208 from then on.
-Behind a servo that stays silent in a sync or bulk read, the others answer when its time is over; a fast read ends there.
+Behind a servo that stays silent in a sync or bulk read, the others answer when its time is over (or never, with
+--fault bus:wait-in-vain@0s); a fast read ends there. A shaft that is held (--fault 3:stuck@5s) heats its motor and
+trips overload within seconds; all that the servos draw lowers the voltage they report.
 
 Standard input is the hand at the servos: 'plug N' and 'unplug N', and 'turn N DEGREES' turns a shaft whose torque is off
 (N as in --servos).
@@ -49,6 +52,8 @@ Examples:
   handwave sim dynamixel --servos 1-12 --link /tmp/servos
   handwave sim dynamixel --servos 1-6:xl330-m288@47,20:xm430-w350 --link /tmp/servos --baud 3000000
   handwave sim dynamixel --servos 1-4 --link /tmp/servos --fault 3:silent@2s..2.5s --fault bus:corrupt=0.01@0s --seed 7
+  handwave sim dynamixel --servos 1-12 --link /tmp/servos --fault bus:unplugged=1@5s..6s     back as /tmp/servos.1
+  handwave sim dynamixel --servos 1-12 --link /tmp/servos --trace motion.csv
   handwave sim dynamixel --servos 1-3 --link /tmp/servos --factory     then type: plug 1
 ";
 
@@ -73,6 +78,16 @@ struct DynamixelArgs {
     /// Delay of the adapter on the way to the client, milliseconds
     #[arg(long, value_name = "X", default_value_t = 0.0)]
     latency_ms: f64,
+    /// Delay of a servo between an instruction and its status, beside its return delay, microseconds
+    #[arg(long, value_name = "X", default_value_t = 0.0)]
+    turnaround_us: f64,
+    /// Delay of each servo behind its predecessor in a fast read, microseconds
+    #[arg(long, value_name = "X", default_value_t = 0.0)]
+    hop_us: f64,
+    /// Write what the servos really do: a row every 5 ms with position, goal (pulses), torque, watchdog,
+    /// load (share of stall), temperature and voltage of each, and the instructions heard so far
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
     /// Inject a fault: TARGET:NAME[=VALUE]@T1s[..T2s], TARGET an id or 'bus' (repeatable, see --list-faults)
     #[arg(long = "fault", value_name = "SPEC")]
     faults: Vec<String>,
@@ -118,6 +133,13 @@ fn dynamixel(args: &DynamixelArgs) -> Result<ExitStatus, Failure> {
     }
     let mut server = PtyServer::open(line.clone(), Arc::clone(&clock), link, port_baud)
         .map_err(Failure::input)?;
+    if let Some(path) = &args.trace {
+        let no_file = |e| Failure::input(format!("--trace {}: {e}", path.display()));
+        let file = std::fs::File::create(path).map_err(no_file)?;
+        let out = Box::new(std::io::BufWriter::new(file));
+        let trace = Trace::new(&line.lock(), out).map_err(no_file)?;
+        server.trace_to(trace);
+    }
     std::thread::spawn(move || follow_hands(&line, clock.as_ref()));
     // A wire does not wait for the scheduler; without the right to it all still works.
     let _best_effort = realtime::request();
@@ -133,6 +155,14 @@ fn build_line(args: &DynamixelArgs, servos: &[Asked]) -> Result<(Line, u32), Str
             args.latency_ms
         ));
     }
+    for (option, value) in [
+        ("--turnaround-us", args.turnaround_us),
+        ("--hop-us", args.hop_us),
+    ] {
+        if !(0.0..=1e6).contains(&value) {
+            return Err(format!("{option} takes 0 to 1000000, not {value}"));
+        }
+    }
     let code = baud::code(args.baud).ok_or_else(|| {
         format!(
             "--baud {} is no rate of these servos; there are {}",
@@ -142,6 +172,8 @@ fn build_line(args: &DynamixelArgs, servos: &[Asked]) -> Result<(Line, u32), Str
     })?;
     let mut line = Line::new(LineOptions {
         paced: !args.unpaced,
+        turnaround: Duration::from_secs_f64(args.turnaround_us * 1e-6),
+        hop: Duration::from_secs_f64(args.hop_us * 1e-6),
         latency: Duration::from_secs_f64(args.latency_ms * 1e-3),
         seed: args.seed,
         ..LineOptions::default()

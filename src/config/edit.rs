@@ -16,18 +16,20 @@ pub fn with_joint_map(text: &str, servos: &[ServoSpec]) -> Result<String, String
         .get_mut("robot")
         .and_then(|robot| robot.get_mut("joint"))
         .ok_or("no [robot] with a list of joints")?;
+    let inline = joints.is_value();
     for servo in servos {
         let entry = entry(joints, &servo.joint)
             .ok_or_else(|| format!("robot.joint has no entry named {:?}", servo.joint))?;
         let direction = servo.direction.sign() as i64;
-        set(
-            entry,
-            "zero_pulse",
-            Value::from(i64::from(servo.zero_pulse)),
-        );
-        set(entry, "direction", Value::from(direction));
         let range = [servo.min_pulse, servo.max_pulse].map(i64::from);
-        set(entry, "range_pulse", Value::Array(Array::from_iter(range)));
+        let values = [
+            ("zero_pulse", Value::from(i64::from(servo.zero_pulse))),
+            ("direction", Value::from(direction)),
+            ("range_pulse", Value::Array(Array::from_iter(range))),
+        ];
+        for (key, value) in values {
+            set(entry, key, value, inline);
+        }
     }
     Ok(document.to_string())
 }
@@ -50,14 +52,28 @@ fn entry<'a>(joints: &'a mut Item, name: &str) -> Option<&'a mut dyn TableLike> 
 }
 
 /// Sets a key, with the spaces and the comment that stood around its value.
-fn set(table: &mut dyn TableLike, key: &str, mut value: Value) {
+fn set(table: &mut dyn TableLike, key: &str, mut value: Value, inline: bool) {
     match table.get_mut(key).and_then(Item::as_value_mut) {
         Some(old) => {
             *value.decor_mut() = old.decor().clone();
             *old = value;
         }
         None => {
-            // A value that closes an inline table may have a space after it that belongs to the bracket.
+            // The space after the last value belongs to the bracket, not to the comma that follows now.
+            let last = table.iter().last().map(|(name, _)| name.to_owned());
+            let last = last.and_then(|name| table.get_mut(&name)?.as_value_mut());
+            if let Some(decor) = last.map(Value::decor_mut)
+                && let Some(space) = decor
+                    .suffix()
+                    .and_then(|raw| raw.as_str())
+                    .map(str::to_owned)
+                && inline
+                && space.trim().is_empty()
+            {
+                decor.set_suffix("");
+                value.decor_mut().set_prefix(" ");
+                value.decor_mut().set_suffix(space);
+            }
             table.insert(key, Item::Value(value));
         }
     }

@@ -123,3 +123,23 @@ fn stl_points(bytes: &[u8]) -> impl Iterator<Item = Vector3<f64>> + '_ {
         })
         .filter(|p| p.iter().all(|v| v.is_finite()))
 }
+
+/// Centre and size of the box around a mesh, in the mesh's frame, scaled; `None` when the file is not found from
+/// `folder` or is no binary STL.
+#[cfg(feature = "collision")]
+pub(super) fn mesh_box(
+    folder: Option<&Path>,
+    file: &str,
+    scale: &Vector3<f64>,
+) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let bytes = std::fs::read(find(folder?, file)?).ok()?;
+    let mut corners: Option<(Vector3<f64>, Vector3<f64>)> = None;
+    for point in stl_points(&bytes) {
+        let point = point.component_mul(scale);
+        let (least, greatest) = corners.get_or_insert((point, point));
+        *least = least.inf(&point);
+        *greatest = greatest.sup(&point);
+    }
+    let (least, greatest) = corners?;
+    Some((0.5 * (least + greatest), greatest - least))
+}

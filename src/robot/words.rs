@@ -7,6 +7,8 @@ use nalgebra::Vector3;
 const WAYS: [(&str, &str); 3] = [("forward", "back"), ("left", "right"), ("up", "down")];
 /// A way along an axis smaller than this share of the largest is not mentioned.
 const WORTH_SAYING: f64 = 0.5;
+/// What is nearer than a centimetre to a joint's axis is not seen to turn about it, metres.
+const WORTH_SEEING_M: f64 = 0.01;
 
 impl RobotModel {
     /// What the positive direction of moving joint number `index` (model order) does, seen from the robot (x
@@ -25,33 +27,82 @@ impl RobotModel {
             return format!("it slides {}", words(&axis));
         }
         let centre = frame.translation.vector;
-        // The point of what hangs on the joint that goes furthest when it turns.
-        let mut furthest = (0.0, Vector3::zeros(), joint.child);
-        for link in 0..self.links.len() {
-            if !self.hangs_on(link, j) {
-                continue;
-            }
-            let pose = self.link_pose(link, positions);
-            let tip = self.tips.get(link).copied().flatten();
-            for point in [
-                Some(pose.translation.vector),
-                tip.map(|t| (pose * t).coords),
-            ] {
-                let Some(point) = point else { continue };
-                let way = axis.cross(&(point - centre));
-                if way.norm() > furthest.0 + 1e-6 {
-                    furthest = (way.norm(), way, link);
-                }
-            }
-        }
+        let furthest = self.furthest(j, &centre, &axis, positions);
         let (length, way, link) = furthest;
-        if length < 0.01 {
+        if length < WORTH_SEEING_M {
             return format!(
                 "it turns as a screw does that goes {} into a nut, clockwise when seen along that way",
                 words(&axis)
             );
         }
         format!("its far end ({}) goes {}", self.links[link], words(&way))
+    }
+
+    /// Where the far end of moving joint number `index` is from that joint, seen from the robot with all joints at
+    /// `positions`: `its far end (end_effector_link) is 34 cm forward and 13 cm up from it`.
+    ///
+    /// Empty for an index without joint, and where nothing hangs on it that one could see turn.
+    pub fn far_end(&self, index: usize, positions: &[f64]) -> String {
+        let Some(&j) = self.actuated.get(index) else {
+            return String::new();
+        };
+        let frame = self.link_pose(self.joints[j].parent, positions) * self.joints[j].origin;
+        let centre = frame.translation.vector;
+        let axis = frame.rotation * self.joints[j].axis.into_inner();
+        let (length, way, link) = self.furthest(j, &centre, &axis, positions);
+        if length < WORTH_SEEING_M || self.joints[j].kind == JointKind::Prismatic {
+            return String::new();
+        }
+        // The way is across the arm from the joint; the arm itself is where the link is.
+        let arm = self.link_pose(link, positions).translation.vector - centre;
+        let arm = match arm.norm() > WORTH_SEEING_M {
+            true => arm,
+            false => way.cross(&axis),
+        };
+        let parts: Vec<String> = arm
+            .iter()
+            .zip(WAYS)
+            .filter(|(x, _)| x.abs() >= WORTH_SEEING_M)
+            .map(|(x, (plus, minus))| {
+                let word = if *x > 0.0 { plus } else { minus };
+                format!("{:.0} cm {word}", 100.0 * x.abs())
+            })
+            .collect();
+        format!(
+            "its far end ({}) is {} from it",
+            self.links[link],
+            parts.join(" and ")
+        )
+    }
+
+    /// The point of what hangs on joint `j` that goes furthest when it turns about `axis` through `centre`: how far a
+    /// radian, which way, on which link.
+    fn furthest(
+        &self,
+        j: usize,
+        centre: &Vector3<f64>,
+        axis: &Vector3<f64>,
+        positions: &[f64],
+    ) -> (f64, Vector3<f64>, usize) {
+        let mut furthest = (0.0, Vector3::zeros(), self.joints[j].child);
+        for link in 0..self.links.len() {
+            if !self.hangs_on(link, j) {
+                continue;
+            }
+            let pose = self.link_pose(link, positions);
+            let tip = self.tips.get(link).copied().flatten();
+            let points = [
+                Some(pose.translation.vector),
+                tip.map(|t| (pose * t).coords),
+            ];
+            for point in points.into_iter().flatten() {
+                let way = axis.cross(&(point - centre));
+                if way.norm() > furthest.0 + 1e-6 {
+                    furthest = (way.norm(), way, link);
+                }
+            }
+        }
+        furthest
     }
 
     /// Whether `link` moves when joint `j` does.
@@ -101,5 +152,11 @@ mod tests {
             "{ways:?}"
         );
         assert_eq!(model.positive_way(9, &rest), "");
+        let place = model.far_end(1, &rest);
+        assert!(
+            place.contains("cm forward") && place.contains("end_effector_link"),
+            "{place}"
+        );
+        assert_eq!(model.far_end(4, &rest), "", "a crank shows nothing");
     }
 }

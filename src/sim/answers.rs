@@ -16,6 +16,10 @@ impl Chain {
     /// Sync and bulk read: one status after the other.
     pub fn answer_in_turn(&mut self, now: Time, baud_bps: u32) {
         let pace = self.pace(baud_bps);
+        let patient = self.options.after_silence == AfterSilence::Wait
+            || self
+                .fault(Target::Bus, FaultKind::WaitInVain, now)
+                .is_some();
         let mut free = now;
         for turn in 0..self.asked.len() {
             let asked = self.asked[turn];
@@ -35,10 +39,10 @@ impl Chain {
                     end = end.max(Some(self.answer(index, asked.id, error, free, baud_bps)));
                 }
             }
-            free = match (end, self.options.after_silence) {
-                (Some(end), _) => end,
-                (None, AfterSilence::Wait) => return,
-                (None, AfterSilence::Answer) => {
+            free = match end {
+                Some(end) => end,
+                None if patient => return,
+                None => {
                     let missed = handwave_dynamixel::wire::status(usize::from(asked.length));
                     free + pace.bytes(missed)
                 }
@@ -54,6 +58,8 @@ impl Chain {
         let blocks_len = u16::try_from(blocks_len).unwrap_or(u16::MAX);
         let mut crc = Crc::new();
         let mut free = now;
+        let again = self.happens(Target::Bus, FaultKind::Duplicated, now);
+        self.combined.clear();
         for turn in 0..self.asked.len() {
             let asked = self.asked[turn];
             let joins = |index: &usize| {
@@ -74,6 +80,7 @@ impl Chain {
                 // The buffer is far longer than the eight bytes.
                 let prefix = fast::encode_prefix(&mut self.frame, blocks_len, &mut crc);
                 let Ok(prefix) = prefix else { return };
+                self.combined.extend_from_slice(prefix);
                 begin = self.wire.send(begin, prefix, pace, &mut self.chance);
             } else if pace.baud.is_some() {
                 begin = begin + self.options.hop;
@@ -83,6 +90,8 @@ impl Chain {
             self.data.clear();
             let error = servo.read_entry(asked.address, asked.length, begin, &mut self.data);
             let Some(error) = error else { return };
+            let own_id = self.spoken_id(label, asked.id, begin);
+            let servo = &self.slots[index].servo;
             let status = Status {
                 id: asked.id,
                 alert: servo.alert(),
@@ -93,20 +102,26 @@ impl Chain {
             // A servo that cannot read what was asked keeps its place in the frame.
             self.data.resize(usize::from(asked.length), 0);
             let block =
-                fast::encode_block(&mut self.frame, error_byte, asked.id, &self.data, &mut crc);
+                fast::encode_block(&mut self.frame, error_byte, own_id, &self.data, &mut crc);
             let Ok(mut len) = block.map(|block| block.len()) else {
                 return;
             };
             self.damage(label, len, begin);
-            let truncated = self.happens(Target::Bus, FaultKind::Truncated, begin);
-            if truncated {
-                len = len.saturating_sub(TRUNCATED_BYTES);
-            }
+            let full = len;
+            len = self.shortened(label, len, begin);
             let block = &self.frame[..len];
+            self.combined.extend_from_slice(block);
             free = self.wire.send(begin, block, pace, &mut self.chance);
-            if truncated {
+            if self.happens(Target::Servo(label), FaultKind::DuplicatedServo, begin) {
+                let block = &self.frame[..len];
+                free = self.wire.send(free, block, pace, &mut self.chance);
+            }
+            if len < full {
                 return;
             }
+        }
+        if again {
+            self.wire.send(free, &self.combined, pace, &mut self.chance);
         }
     }
 
@@ -143,7 +158,7 @@ impl Chain {
         let begin = self.begin(index, free);
         let begin = self.clutter(begin, pace);
         let status = Status {
-            id,
+            id: self.spoken_id(label, id, begin),
             alert: self.slots[index].servo.alert(),
             error,
             params: &self.data,
@@ -152,12 +167,11 @@ impl Chain {
             return free;
         };
         self.damage(label, len, begin);
-        if self.happens(Target::Bus, FaultKind::Truncated, begin) {
-            len = len.saturating_sub(TRUNCATED_BYTES);
-        }
+        len = self.shortened(label, len, begin);
         let frame = &self.frame[..len];
         let mut end = self.wire.send(begin, frame, pace, &mut self.chance);
-        if self.happens(Target::Bus, FaultKind::Duplicated, begin) {
+        let own = self.happens(Target::Servo(label), FaultKind::DuplicatedServo, begin);
+        if self.happens(Target::Bus, FaultKind::Duplicated, begin) || own {
             let frame = &self.frame[..len];
             end = self.wire.send(end, frame, pace, &mut self.chance);
         }
@@ -186,6 +200,22 @@ impl Chain {
         begin
     }
 
+    /// The id that servo `label` answers under instead of its `id`.
+    fn spoken_id(&self, label: u8, id: u8, now: Time) -> u8 {
+        let wrong = self.fault(Target::Servo(label), FaultKind::WrongId, now);
+        wrong.map_or(id, |wrong| wrong as u8)
+    }
+
+    /// How many of the `len` bytes of a reply go out.
+    fn shortened(&mut self, label: u8, len: usize, now: Time) -> usize {
+        let own = self.happens(Target::Servo(label), FaultKind::TruncatedServo, now);
+        let bus = self.happens(Target::Bus, FaultKind::Truncated, now);
+        match own || bus {
+            true => len.saturating_sub(TRUNCATED_BYTES),
+            false => len,
+        }
+    }
+
     /// Flips one bit of the first `len` bytes of the frame buffer if a fault says so.
     fn damage(&mut self, label: u8, len: usize, begin: Time) {
         let own = self.happens(Target::Servo(label), FaultKind::CorruptServo, begin);
@@ -194,6 +224,14 @@ impl Chain {
             let bit = self.chance.below(8 * len);
             if let Some(byte) = self.frame.get_mut(bit / 8) {
                 *byte ^= 1 << (bit % 8);
+            }
+        }
+        let twin = self.fault(Target::Servo(label), FaultKind::DuplicateId, begin);
+        if twin.is_some() {
+            // Two that speak at once and say nearly the same: some bytes come through.
+            for byte in &mut self.frame[..len] {
+                let mask = self.chance.bits();
+                *byte ^= (mask as u8) & (mask >> 8) as u8;
             }
         }
     }

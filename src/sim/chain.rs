@@ -3,11 +3,13 @@
 use super::fault::{Chance, FaultError, FaultKind, FaultSpec, Target};
 use super::line::LineOptions;
 use super::servo::{Ailments, Servo};
+use super::thermal::TICK_NANOS;
 use super::wire::Wire;
 use crate::base::Time;
 use crate::bus::dynamixel::model::{address, hardware_error};
 use handwave_dynamixel::instruction::Instruction;
 use handwave_dynamixel::{BROADCAST_ID, ErrorCode, Frame, MAX_ID, baud, frame};
+use std::time::Duration;
 
 /// Room for the longest status: a whole control table, stuffed.
 const FRAME_ROOM: usize = 4096;
@@ -36,11 +38,17 @@ pub(super) struct Chain {
     pub chance: Chance,
     pub slots: Vec<Slot>,
     faults: Vec<FaultSpec>,
-    /// When faults begin or end, ascending; a label means that this servo reboots.
-    changes: Vec<(Time, Option<u8>)>,
+    /// When faults begin or end, ascending, with the fault if it strikes once at that time.
+    changes: Vec<(Time, Option<FaultSpec>)>,
     pub now: Time,
+    /// Up to when the supply was followed.
+    supply_at: Time,
+    /// Instructions heard on the line so far.
+    pub packets: u64,
     pub data: Vec<u8>,
     pub frame: Vec<u8>,
+    /// What a combined status has been so far.
+    pub combined: Vec<u8>,
     pub asked: Vec<Asked>,
 }
 
@@ -48,14 +56,17 @@ impl Chain {
     pub fn new(options: LineOptions) -> Self {
         Self {
             options,
-            wire: Wire::new(),
+            wire: Wire::new(options.latency),
             chance: Chance::new(options.seed),
             slots: Vec::new(),
             faults: Vec::new(),
             changes: Vec::new(),
             now: Time::from_nanos(i64::MIN),
+            supply_at: Time::ZERO,
+            packets: 0,
             data: Vec::with_capacity(FRAME_ROOM),
             frame: vec![0; FRAME_ROOM],
+            combined: Vec::with_capacity(FRAME_ROOM),
             asked: Vec::with_capacity(256),
         }
     }
@@ -93,9 +104,9 @@ impl Chain {
     }
 
     pub fn inject(&mut self, fault: FaultSpec) -> Result<(), FaultError> {
-        let label = match fault.target {
-            Target::Bus => None,
-            Target::Servo(label) if self.slot(label).is_some() => Some(label),
+        match fault.target {
+            Target::Bus => {}
+            Target::Servo(label) if self.slot(label).is_some() => {}
             Target::Servo(label) => {
                 let labels: Vec<_> = self.labels().map(|l| l.to_string()).collect();
                 return Err(FaultError {
@@ -106,10 +117,10 @@ impl Chain {
                     ),
                 });
             }
-        };
+        }
         self.faults.push(fault);
-        let reboots = label.filter(|_| fault.kind == FaultKind::Reboot);
-        self.changes.push((fault.from.max(self.now), reboots));
+        let strikes = fault.kind.is_event().then_some(fault);
+        self.changes.push((fault.from.max(self.now), strikes));
         self.changes
             .extend(fault.until.map(|until| (until.max(self.now), None)));
         self.changes.sort_by_key(|(time, _)| *time);
@@ -124,6 +135,15 @@ impl Chain {
             .map(|f| f.value)
     }
 
+    pub fn adapter_name(&self, now: Time) -> u32 {
+        let over = self.faults.iter().filter_map(|fault| {
+            let ended = fault.until.filter(|&until| until <= now)?;
+            (fault.kind == FaultKind::Unplugged).then_some((ended, fault.value))
+        });
+        over.max_by_key(|(ended, _)| *ended)
+            .map_or(0, |(_, value)| value as u32)
+    }
+
     pub fn next_change(&self, now: Time) -> Option<Time> {
         let times = self.changes.iter().map(|(time, _)| *time);
         times.filter(|&time| time > now).min()
@@ -131,28 +151,66 @@ impl Chain {
 
     /// Moves all servos on to `now`, through every change of faults on the way.
     pub fn advance(&mut self, now: Time) {
-        while let Some(&(time, reboots)) = self.changes.first()
+        while let Some(&(time, strikes)) = self.changes.first()
             && time <= now
         {
             self.changes.remove(0);
+            self.follow_supply(time);
             for index in 0..self.slots.len() {
                 let label = self.slots[index].label;
-                let ailments = self.ailments(label, time);
+                let pulse_rad = self.slots[index].servo.pulse_rad();
+                let ailments = self.ailments(label, pulse_rad, time);
                 let servo = &mut self.slots[index].servo;
                 servo.advance(time);
-                if reboots == Some(label) {
-                    servo.reboot(time);
+                match strikes.filter(|s| s.servo().is_none_or(|struck| struck == label)) {
+                    None => {}
+                    Some(FaultSpec {
+                        kind: FaultKind::TorqueLoss,
+                        ..
+                    }) => servo.lose_torque(),
+                    Some(FaultSpec {
+                        kind: FaultKind::WatchdogTrip,
+                        ..
+                    }) => servo.trip_watchdog(),
+                    Some(_) => servo.reboot(time),
                 }
                 servo.set_ailments(ailments);
             }
+            self.wire.loss = self
+                .fault(Target::Bus, FaultKind::LostBytes, time)
+                .unwrap_or(0.0);
+            let late_ms = self.fault(Target::Bus, FaultKind::Latency, time);
+            let late = Duration::from_secs_f64(late_ms.unwrap_or(0.0) * 1e-3);
+            self.wire.delay = self.options.latency + late;
         }
+        self.follow_supply(now);
         for slot in &mut self.slots {
             slot.servo.advance(now);
         }
         self.now = self.now.max(now);
     }
 
-    fn ailments(&self, label: u8, now: Time) -> Ailments {
+    /// Lets what all servos draw pull the supply down, in ticks on a fixed grid up to `now`.
+    fn follow_supply(&mut self, now: Time) {
+        let tick = |time: Time| time.nanos().div_euclid(TICK_NANOS);
+        if self.slots.is_empty() {
+            self.supply_at = self.supply_at.max(now);
+        }
+        while tick(self.supply_at) < tick(now) {
+            self.supply_at = Time::from_nanos((tick(self.supply_at) + 1) * TICK_NANOS);
+            let mut drawn_a = 0.0;
+            for slot in self.slots.iter_mut().filter(|slot| slot.plugged) {
+                slot.servo.advance(self.supply_at);
+                drawn_a += slot.servo.supply_current_a();
+            }
+            for slot in &mut self.slots {
+                slot.servo
+                    .set_supply_drop(drawn_a * self.options.supply_ohm);
+            }
+        }
+    }
+
+    fn ailments(&self, label: u8, pulse_rad: f64, now: Time) -> Ailments {
         let active = |kind| self.fault(Target::Servo(label), kind, now);
         let mut bits = 0;
         for (kind, bit) in [
@@ -166,10 +224,20 @@ impl Chain {
                 bits |= bit;
             }
         }
+        let seed = self.options.seed ^ u64::from(label) << 56;
         Ailments {
             hardware_error: bits,
             stuck: active(FaultKind::Stuck).is_some(),
+            load: active(FaultKind::HeavyLoad).unwrap_or(0.0),
+            duty_limit: active(FaultKind::Slow),
+            sag_v: active(FaultKind::Sag).unwrap_or(0.0),
+            encoder_jump_rad: active(FaultKind::EncoderJump).unwrap_or(0.0) * pulse_rad,
+            noise_pulses: active(FaultKind::EncoderNoise).map(|most| (most, seed)),
+            frozen: active(FaultKind::FrozenPosition).is_some(),
+            deaf: active(FaultKind::Deaf).is_some(),
+            refuses: active(FaultKind::Refuses).map(|code| code as u8),
             watchdog_defect: active(FaultKind::WatchdogDefect).is_some(),
+            watchdog_runaway: active(FaultKind::WatchdogRunaway),
             temperature_c: active(FaultKind::Overheat),
             voltage_v: active(FaultKind::Voltage),
         }
@@ -184,6 +252,7 @@ impl Chain {
         if self.happens(Target::Bus, FaultKind::CorruptBus, now) {
             return;
         }
+        self.packets += 1;
         for index in 0..self.slots.len() {
             if self.hears(index, now, baud_bps) {
                 self.slots[index].servo.heard(now);

@@ -1,5 +1,7 @@
-//! Faults one can inject into the simulated line: what there is, and how to ask for it.
+//! Faults one can inject into the simulated line: how to ask for one ([`FAULTS`] says what there is).
 
+pub use super::chance::Chance;
+pub use super::fault_table::{FAULTS, FaultInfo, FaultKind, ValueRule};
 use crate::base::Time;
 use crate::base::suggest::nearest;
 use std::fmt;
@@ -22,119 +24,6 @@ impl fmt::Display for Scope {
         })
     }
 }
-
-/// The faults.
-#[derive(Copy, Clone, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "described in the table FAULTS")]
-pub enum FaultKind {
-    Silent,
-    Disconnected,
-    Late,
-    Overload,
-    Overheat,
-    Voltage,
-    Encoder,
-    Shock,
-    Reboot,
-    CorruptServo,
-    Stuck,
-    WatchdogDefect,
-    CorruptBus,
-    Truncated,
-    Duplicated,
-    Foreign,
-    Noise,
-    Echo,
-    Unplugged,
-}
-
-/// The value a fault takes: what it is when none is given, and what it may be.
-#[derive(Copy, Clone, Debug)]
-pub struct ValueRule {
-    /// Taken when the specification gives none.
-    pub default: f64,
-    /// Smallest value allowed.
-    pub min: f64,
-    /// Largest value allowed.
-    pub max: f64,
-}
-
-/// One row of the table of faults.
-#[derive(Copy, Clone, Debug)]
-pub struct FaultInfo {
-    /// The fault.
-    pub kind: FaultKind,
-    /// Name in a specification.
-    pub name: &'static str,
-    /// What it happens to.
-    pub scope: Scope,
-    /// Its value; `None` when it takes none.
-    pub value: Option<ValueRule>,
-    /// What it does, with the unit and default of its value.
-    pub description: &'static str,
-}
-
-const fn row(
-    kind: FaultKind,
-    name: &'static str,
-    scope: Scope,
-    value: Option<(f64, f64, f64)>,
-    description: &'static str,
-) -> FaultInfo {
-    FaultInfo {
-        kind,
-        name,
-        scope,
-        value: match value {
-            Some((default, min, max)) => Some(ValueRule { default, min, max }),
-            None => None,
-        },
-        description,
-    }
-}
-
-/// Every fault there is. A fault lasts from T1 to T2, or to the end without T2.
-#[rustfmt::skip]
-pub static FAULTS: &[FaultInfo] = &[
-    row(FaultKind::Silent, "silent", Scope::Servo, None,
-        "hears and obeys, but does not answer"),
-    row(FaultKind::Disconnected, "disconnected", Scope::Servo, None,
-        "data wire off: neither hears nor answers, power stays on"),
-    row(FaultKind::Late, "late", Scope::Servo, Some((5.0, 0.0, 10_000.0)),
-        "answers late by VALUE milliseconds (default 5)"),
-    row(FaultKind::Overload, "overload", Scope::Servo, None,
-        "latches hardware error bit 5: torque off until a reboot"),
-    row(FaultKind::Overheat, "overheat", Scope::Servo, Some((85.0, 0.0, 127.0)),
-        "reports VALUE degrees Celsius (default 85) and latches hardware error bit 2: torque off until a reboot"),
-    row(FaultKind::Voltage, "voltage", Scope::Servo, Some((5.0, 0.0, 30.0)),
-        "reports VALUE volts (default 5.0) and latches hardware error bit 0"),
-    row(FaultKind::Encoder, "encoder", Scope::Servo, None,
-        "latches hardware error bit 3"),
-    row(FaultKind::Shock, "shock", Scope::Servo, None,
-        "latches hardware error bit 4: torque off until a reboot"),
-    row(FaultKind::Reboot, "reboot", Scope::Servo, None,
-        "brown-out at T1: restarts once, torque off, RAM lost"),
-    row(FaultKind::CorruptServo, "corrupt", Scope::Servo, Some((1.0, 0.0, 1.0)),
-        "one bit flipped in each of its replies with probability VALUE (default 1)"),
-    row(FaultKind::Stuck, "stuck", Scope::Servo, None,
-        "the shaft is blocked"),
-    row(FaultKind::WatchdogDefect, "watchdog-defect", Scope::Servo, None,
-        "its bus watchdog trips but does not stop the motion"),
-    row(FaultKind::CorruptBus, "corrupt", Scope::Bus, Some((0.05, 0.0, 1.0)),
-        "one bit flipped in each packet, either way, with probability VALUE (default 0.05)"),
-    row(FaultKind::Truncated, "truncated", Scope::Bus, Some((0.05, 0.0, 1.0)),
-        "each reply loses its last three bytes with probability VALUE (default 0.05)"),
-    row(FaultKind::Duplicated, "duplicated", Scope::Bus, Some((0.05, 0.0, 1.0)),
-        "each reply is sent twice with probability VALUE (default 0.05)"),
-    row(FaultKind::Foreign, "foreign", Scope::Bus, Some((0.05, 0.0, 1.0)),
-        "a status of a servo nobody asked (id 252) before each reply with probability VALUE (default 0.05)"),
-    row(FaultKind::Noise, "noise", Scope::Bus, Some((4.0, 1.0, 64.0)),
-        "VALUE stale bytes (default 4) before each reply"),
-    row(FaultKind::Echo, "echo", Scope::Bus, None,
-        "the adapter hears itself: what the host sends comes back"),
-    row(FaultKind::Unplugged, "unplugged", Scope::Bus, None,
-        "the adapter is gone, with the port; it comes back at T2"),
-];
 
 /// What a fault specification names.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
@@ -176,12 +65,37 @@ impl FaultSpec {
         }
     }
 
+    /// Its row in the table of faults.
+    pub fn info(&self) -> Option<&'static FaultInfo> {
+        FAULTS.iter().find(|info| info.kind == self.kind)
+    }
+
     /// The servo it happens to; `None` for the whole line.
     pub fn servo(&self) -> Option<u8> {
         match self.target {
             Target::Servo(id) => Some(id),
             Target::Bus => None,
         }
+    }
+}
+
+/// For people, without the target: `late = 5 8.000..9.000 s: answers late by ...`.
+impl fmt::Display for FaultSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, value, description) = self.info().map_or(("", None, ""), |info| {
+            (info.name, info.value, info.description)
+        });
+        f.write_str(name)?;
+        if value.is_some() {
+            write!(f, "={}", self.value)?;
+        }
+        write!(f, " {:.3}", self.from.secs())?;
+        match self.until {
+            _ if self.kind.is_event() => f.write_str(" s")?,
+            Some(until) => write!(f, "..{:.3} s", until.secs())?,
+            None => f.write_str(" s to the end")?,
+        }
+        write!(f, ": {description}")
     }
 }
 
@@ -287,36 +201,6 @@ fn seconds(text: &str) -> Result<Time, String> {
         .filter(|number| (0.0..1e9).contains(number))
         .map(Time::from_secs)
         .ok_or_else(|| format!("'{text}' is no time; expected seconds such as 2.5s"))
-}
-
-/// Chance for faults: xorshift64*, the same sequence for the same seed on every machine.
-#[derive(Clone, Debug)]
-pub struct Chance(u64);
-
-impl Chance {
-    /// The sequence of `seed`.
-    pub fn new(seed: u64) -> Self {
-        // Spreads neighbouring seeds; the state must not be zero.
-        Self((seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x2545_F491_4F6C_DD1D) | 1)
-    }
-
-    /// The next 32 bits.
-    pub fn bits(&mut self) -> u32 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32) as u32
-    }
-
-    /// True with this probability.
-    pub fn happens(&mut self, probability: f64) -> bool {
-        f64::from(self.bits()) < probability * 4_294_967_296.0
-    }
-
-    /// A number below `bound`; 0 when that is 0.
-    pub fn below(&mut self, bound: usize) -> usize {
-        ((u64::from(self.bits()) * bound as u64) >> 32) as usize
-    }
 }
 
 #[cfg(test)]

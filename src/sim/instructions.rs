@@ -44,6 +44,7 @@ impl Servo {
                 }
                 (ANSWERS_READS, self.read(address, length, now, data))
             }
+            _ if self.ailments.refuses.is_some() => (ANSWERS_ALL, self.willing()),
             Instruction::Write { address, data } => (ANSWERS_ALL, self.write(address, data)),
             Instruction::RegWrite { address, data } => (ANSWERS_ALL, self.hold(address, data)),
             Instruction::Action => (ANSWERS_ALL, self.act()),
@@ -105,8 +106,15 @@ impl Servo {
         now: Time,
         data: &mut Vec<u8>,
     ) -> Result<(), ErrorCode> {
+        self.willing()?;
         self.refresh(now);
         Ok(self.table.read(address, length, data)?)
+    }
+
+    /// Refuses when a fault makes it.
+    fn willing(&self) -> Result<(), ErrorCode> {
+        let refuses = self.ailments.refuses.map(ErrorCode::from_byte);
+        refuses.map_or(Ok(()), Err)
     }
 
     fn check(&self, address: u16, data: &[u8]) -> Result<(), TableError> {
@@ -116,8 +124,11 @@ impl Servo {
     }
 
     fn write(&mut self, address: u16, data: &[u8]) -> Result<(), ErrorCode> {
+        self.willing()?;
         self.check(address, data)?;
-        self.apply_write(address, data);
+        if !self.ailments.deaf {
+            self.apply_write(address, data);
+        }
         Ok(())
     }
 

@@ -34,6 +34,8 @@ pub struct LineOptions {
     pub hop: Duration,
     /// Delay of the adapter between the line and the host.
     pub latency: Duration,
+    /// Resistance between the supply and the servos, ohms: what all of them draw lowers their voltage.
+    pub supply_ohm: f64,
     /// What happens behind a silent servo.
     pub after_silence: AfterSilence,
     /// Where chance begins, for faults.
@@ -47,6 +49,8 @@ impl Default for LineOptions {
             turnaround: Duration::ZERO,
             hop: Duration::ZERO,
             latency: Duration::ZERO,
+            // A small battery, its lead and a board.
+            supply_ohm: 0.1,
             after_silence: AfterSilence::default(),
             seed: 1,
         }
@@ -107,6 +111,12 @@ impl Line {
         self.chain.inject(fault)
     }
 
+    /// Lets chance, for faults, begin anew at `seed`.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.chain.options.seed = seed;
+        self.chain.chance = Chance::new(seed);
+    }
+
     /// The servo called `label`, as of the latest [`Line::advance`] or traffic.
     pub fn servo(&self, label: u8) -> Option<&Servo> {
         self.chain.slot(label).map(|slot| &slot.servo)
@@ -160,10 +170,9 @@ impl Line {
 
     /// Takes bytes that have arrived at the host by `now` into `buf`; returns how many.
     pub fn receive(&mut self, now: Time, buf: &mut [u8]) -> usize {
-        let on_line = now - self.chain.options.latency;
         let mut count = 0;
         while let Some(cell) = buf.get_mut(count) {
-            let Some(byte) = self.chain.wire.pop(on_line) else {
+            let Some(byte) = self.chain.wire.pop(now) else {
                 break;
             };
             *cell = byte;
@@ -174,8 +183,7 @@ impl Line {
 
     /// When the byte `index` places from the next one (0) arrives at the host; `None` when none is under way.
     pub fn arrival(&self, index: usize) -> Option<Time> {
-        let at = self.chain.wire.time_of(index)?;
-        Some(at + self.chain.options.latency)
+        self.chain.wire.arrival(index)
     }
 
     /// Forgets all bytes under way: the host's end was closed or unplugged.
@@ -189,6 +197,17 @@ impl Line {
         self.chain
             .fault(Target::Bus, FaultKind::Unplugged, now)
             .is_some()
+    }
+
+    /// Under which name the adapter is there (or will be, or was): 0 is its first one. Each unplugging
+    /// that is over by `now` gives it the name of its value.
+    pub fn adapter_name(&self, now: Time) -> u32 {
+        self.chain.adapter_name(now)
+    }
+
+    /// Instructions that the servos have heard so far.
+    pub fn packets(&self) -> u64 {
+        self.chain.packets
     }
 
     /// The next time after `now` at which a fault begins or ends.
@@ -208,7 +227,7 @@ impl Chain {
     fn collide(&mut self, at: Time, pace: Pace) -> u8 {
         let chance: &mut Chance = &mut self.chance;
         match self.wire.collide(at, pace, chance) {
-            true => chance.bits() as u8 | 1,
+            true => chance.flips(),
             false => 0,
         }
     }

@@ -5,9 +5,12 @@
 //! [`SimPort`] inside the process, in virtual or real time, and a [`PtyServer`] on a
 //! pseudo-terminal for any client.
 
+mod ailments;
 mod answers;
 mod chain;
+mod chance;
 pub mod fault;
+mod fault_table;
 mod instructions;
 pub mod line;
 pub mod models;
@@ -18,6 +21,8 @@ pub mod pty;
 mod registers;
 pub mod servo;
 pub mod table;
+pub mod thermal;
+pub mod trace;
 mod wire;
 
 pub use fault::FaultSpec;

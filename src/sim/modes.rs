@@ -60,11 +60,6 @@ impl Servo {
         limit.map_or(885.0, |register| register.max as f64)
     }
 
-    /// Supply that the motor's data holds at, volts.
-    pub(super) fn nominal_v(&self) -> f64 {
-        self.table.device().initial("present_input_voltage") as f64 * 0.1
-    }
-
     /// What register 126 shows in the shaft's direction: load in 0.1 %, or current in its unit.
     pub(super) fn shown_effort(&self) -> f64 {
         let device = self.table.device();

@@ -48,6 +48,8 @@ pub struct Motor {
     pub duty: f64,
     /// Torque from outside (gravity, a hand), N m; positive pushes the angle up.
     pub external_nm: f64,
+    /// Supply as a share of the one that [`MotorSpec`] holds at.
+    pub supply: f64,
     /// The shaft is blocked: it keeps its angle whatever the torque.
     pub blocked: bool,
 }
@@ -62,6 +64,7 @@ impl Motor {
             torque_nm: 0.0,
             duty: 0.0,
             external_nm: 0.0,
+            supply: 1.0,
             blocked: false,
         }
     }
@@ -72,7 +75,9 @@ impl Motor {
         self.duty = duty.unwrap_or(0.0).clamp(-1.0, 1.0);
         // The linear speed-torque line of a DC motor.
         self.torque_nm = match duty {
-            Some(_) => spec.stall_nm * (self.duty - self.speed_rad_s / spec.no_load_rad_s),
+            Some(_) => {
+                spec.stall_nm * (self.duty * self.supply - self.speed_rad_s / spec.no_load_rad_s)
+            }
             None => 0.0,
         };
         if self.blocked {
@@ -112,7 +117,7 @@ impl Motor {
     pub fn rests(&self, duty: Option<f64>) -> bool {
         let (drive, friction) = match duty {
             Some(duty) => (
-                self.spec.stall_nm * duty.clamp(-1.0, 1.0),
+                self.spec.stall_nm * duty.clamp(-1.0, 1.0) * self.supply,
                 self.spec.friction_nm,
             ),
             None => (0.0, self.spec.friction_off_nm),

@@ -16,36 +16,66 @@ pub struct SimPort {
     baud: u32,
     /// Let go of, and not opened again since.
     closed: bool,
+    /// Which of the adapter's names this was opened under; 0 is the first.
+    adapter: u32,
+    name: String,
 }
 
 impl SimPort {
-    /// A port at `baud_bps` on `line`. Keep a clone of the line to look at its servos.
+    /// A port at `baud_bps` on `line`, under the name that the adapter has now: `sim`, or `sim.1` once a
+    /// fault has brought it back so. Keep a clone of the line to look at its servos.
     pub fn new(line: SharedLine, clock: Arc<dyn Clock>, baud_bps: u32) -> Self {
-        Self {
+        let mut port = Self {
             line,
             clock,
             baud: baud_bps,
             closed: false,
-        }
+            adapter: 0,
+            name: String::new(),
+        };
+        port.find();
+        port
+    }
+
+    /// The name that the adapter has now, and its number.
+    fn present_name(&self) -> (u32, String) {
+        let adapter = self.line.lock().adapter_name(self.clock.now());
+        let name = match adapter {
+            0 => "sim".to_owned(),
+            number => format!("sim.{number}"),
+        };
+        (adapter, name)
+    }
+
+    /// Takes the name that the adapter has now.
+    fn find(&mut self) {
+        (self.adapter, self.name) = self.present_name();
     }
 
     fn check(&self, now: Time) -> Result<(), PortError> {
         let mut line = self.line.lock();
-        if !self.closed && !line.is_unplugged(now) {
+        let there = line.adapter_name(now);
+        let reason = if self.closed {
+            "it was let go of".to_owned()
+        } else if line.is_unplugged(now) {
+            "unplugged by an injected fault".to_owned()
+        } else if there != self.adapter {
+            format!("an injected fault has plugged it in again as sim.{there}")
+        } else {
             return Ok(());
-        }
+        };
         line.advance(now);
         line.clear();
         Err(PortError::Gone {
-            port: self.name().to_owned(),
-            reason: "unplugged by an injected fault".to_owned(),
+            port: self.name.clone(),
+            reason,
         })
     }
 }
 
 impl Port for SimPort {
     fn name(&self) -> &str {
-        "sim"
+        &self.name
     }
 
     fn baud(&self) -> u32 {
@@ -107,12 +137,13 @@ impl Port for SimPort {
     }
 
     fn candidates(&self) -> Vec<String> {
-        vec![self.name().to_owned()]
+        vec![self.present_name().1]
     }
 
-    /// It comes back under its own name, once it is plugged in again.
+    /// It comes back under the name that it has then, once it is plugged in again.
     fn reopen(&mut self, _: &str) -> Result<(), PortError> {
         self.closed = false;
+        self.find();
         self.check(self.clock.now())
     }
 

@@ -1,6 +1,7 @@
 //! A simulated line on a pseudo-terminal, for any client that opens serial ports. Linux.
 
 use super::line::{Line, SharedLine};
+use super::trace::Trace;
 use crate::base::{Clock, Time};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::inotify;
@@ -24,8 +25,8 @@ const BATCH: Duration = Duration::from_millis(1);
 const REPLY_GAP: Duration = Duration::from_micros(150);
 /// The kernel wakes us this much before a byte is due; the rest is spun away.
 const WAKE_EARLY: Duration = Duration::from_micros(90);
-/// How often a change of faults is looked for when nothing else happens.
-const IDLE_LOOK: Duration = Duration::from_secs(3600);
+/// How often the servos are moved on when nothing else happens.
+const IDLE_LOOK: Duration = Duration::from_secs(1);
 
 /// Why the server ended or could not begin.
 #[derive(Debug, thiserror::Error)]
@@ -59,9 +60,14 @@ fn system(action: &'static str) -> impl Fn(Errno) -> PtyError {
 pub struct PtyServer {
     line: SharedLine,
     clock: Arc<dyn Clock>,
+    /// Where the terminal is linked now, and at first.
     link: PathBuf,
+    first_link: PathBuf,
     baud: u32,
     terminal: Option<Terminal>,
+    trace: Option<Trace>,
+    /// When the servos are moved on if nobody asks.
+    idle_at: Time,
 }
 
 /// Both ends of a pseudo-terminal, and who opens and closes the clients' end.
@@ -89,11 +95,19 @@ impl PtyServer {
             line,
             clock,
             link: link.to_owned(),
+            first_link: link.to_owned(),
             baud: baud_bps,
             terminal: None,
+            trace: None,
+            idle_at: Time::ZERO,
         };
         server.plug()?;
         Ok(server)
+    }
+
+    /// Writes down from now on what the servos do.
+    pub fn trace_to(&mut self, trace: Trace) {
+        self.trace = Some(trace);
     }
 
     /// Serves until `stop` becomes readable (a pipe or socket that somebody writes to or closes).
@@ -105,6 +119,7 @@ impl PtyServer {
         loop {
             let now = self.clock.now();
             self.follow_adapter(now)?;
+            self.move_on(now)?;
             self.deliver(now, &mut outgoing)?;
             let wait = self.until_next(now);
             let mut fds = watched(stop);
@@ -138,10 +153,28 @@ impl PtyServer {
         Ok(())
     }
 
-    /// How long to sleep: until bytes are due or a fault changes.
+    /// Moves the servos on when nobody has asked for a while, and writes the trace.
+    fn move_on(&mut self, now: Time) -> Result<(), PtyError> {
+        let mut line = self.line.lock();
+        if let Some(trace) = &mut self.trace {
+            let written = trace.follow(&mut line, now);
+            return written.map_err(|reason| PtyError::System {
+                action: "write the trace",
+                reason,
+            });
+        }
+        if now >= self.idle_at {
+            line.advance(now);
+            self.idle_at = now + IDLE_LOOK;
+        }
+        Ok(())
+    }
+
+    /// How long to sleep: until bytes are due, a fault changes or the servos are to be moved on.
     fn until_next(&self, now: Time) -> Duration {
         let line = self.line.lock();
-        let change = line.next_fault_change(now).unwrap_or(now + IDLE_LOOK);
+        let due = self.trace.as_ref().map_or(self.idle_at, Trace::due);
+        let change = line.next_fault_change(now).unwrap_or(due).min(due);
         let wake = match Batch::next(&line) {
             Some(batch) => batch.wake().min(change),
             None => change,
@@ -226,6 +259,8 @@ impl PtyServer {
     }
 
     fn plug(&mut self) -> Result<(), PtyError> {
+        let name = self.line.lock().adapter_name(self.clock.now());
+        self.link = named(&self.first_link, name);
         let terminal = Terminal::open(self.baud)?;
         self.make_link(&terminal.path)
             .map_err(|reason| PtyError::Link {
@@ -304,6 +339,16 @@ impl Terminal {
             clients: 0,
         })
     }
+}
+
+/// The link of an adapter that came back under another name: `PATH.1`; 0 is its first name.
+fn named(first: &Path, name: u32) -> PathBuf {
+    if name == 0 {
+        return first.to_owned();
+    }
+    let mut path = first.as_os_str().to_owned();
+    path.push(format!(".{name}"));
+    path.into()
 }
 
 /// The bytes that go to the client together next.

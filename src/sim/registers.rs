@@ -15,6 +15,7 @@ impl Servo {
     /// Brings the registers that show the present state up to date.
     pub(super) fn refresh(&mut self, now: Time) {
         let pulses = self.position_pulses();
+        let shown = pulses + self.encoder_noise(now);
         let direction = self.setpoint.direction;
         let model = self.table.device().model;
         let speed = self.speed_rad_s() / model.velocity_unit_rad_s;
@@ -41,8 +42,7 @@ impl Servo {
             status |= 1 << 3;
         }
         let tick = now.saturating_since(self.booted_at).as_millis() % 32_768;
-        let voltage = self.ailments.voltage_v.unwrap_or(self.nominal_v());
-        let temperature = self.ailments.temperature_c.unwrap_or(32.0);
+        let (voltage, temperature) = (self.voltage_v(), self.temperature_c());
         for (register, value) in [
             (address::REALTIME_TICK, tick as i64),
             (address::MOVING, i64::from(moving)),
@@ -56,7 +56,7 @@ impl Servo {
                 (self.shown_effort() * direction).round() as i64,
             ),
             (address::PRESENT_VELOCITY, speed.round() as i64),
-            (address::PRESENT_POSITION, pulses.round() as i64),
+            (address::PRESENT_POSITION, shown.round() as i64),
             (address::VELOCITY_TRAJECTORY, path_speed.round() as i64),
             (address::POSITION_TRAJECTORY, path.round() as i64),
             (
@@ -66,7 +66,11 @@ impl Servo {
             (address::PRESENT_TEMPERATURE, temperature.round() as i64),
             (address::BACKUP_READY, i64::from(self.backup.is_some())),
         ] {
-            self.table.set(register, value);
+            let of_motion =
+                (address::PRESENT_LOAD..address::VELOCITY_TRAJECTORY).contains(&register);
+            if !(self.ailments.frozen && of_motion) {
+                self.table.set(register, value);
+            }
         }
     }
 
@@ -90,7 +94,7 @@ impl Servo {
                 // Latched until a reboot; the servo answers, and its torque stays off.
                 self.table.set(address::TORQUE_ENABLE, 0);
             } else {
-                self.profile.angle_rad = self.motor.angle_rad;
+                self.profile.angle_rad = self.measured_rad();
                 self.profile.speed_rad_s = 0.0;
             }
         }
@@ -155,7 +159,7 @@ impl Servo {
     pub(super) fn clear_turns(&mut self) {
         let begin = self.centre_rad() - PI;
         self.motor.angle_rad = begin + (self.motor.angle_rad - begin).rem_euclid(TAU);
-        self.profile.angle_rad = self.motor.angle_rad;
+        self.profile.angle_rad = self.measured_rad();
         self.profile.speed_rad_s = 0.0;
         let pulses = self.position_pulses().round() as i64;
         self.table.set(address::GOAL_POSITION, pulses);

@@ -1,35 +1,19 @@
 //! One simulated servo: control table, motor, latched errors, bus watchdog, moved along by time alone.
 
+pub use super::ailments::Ailments;
 use super::modes::centre_rad;
 use super::motor::{Motor, Profile, SUBSTEP_NANOS};
 use super::table::{ControlTable, Device};
+use super::thermal::{TICK_SUBSTEPS, Thermal};
 use crate::base::Time;
-use crate::bus::dynamixel::model::{PULSES_PER_TURN, RAM_BEGIN, address};
-use std::f64::consts::TAU;
+use crate::bus::dynamixel::model::{RAM_BEGIN, address};
 use std::time::Duration;
 
-/// Radians of one position pulse of an X series servo.
-pub const PULSE_RAD: f64 = TAU / PULSES_PER_TURN;
 /// How long a servo is deaf and mute after a reboot.
 pub const BOOT_TIME: Duration = Duration::from_millis(250);
 
 /// Velocity error, as a share of the no-load speed, times this is duty in velocity mode.
 const VELOCITY_GAIN: f64 = 4.0;
-
-/// What injected faults do to a servo at present.
-#[derive(Copy, Clone, Debug, Default, PartialEq)]
-pub struct Ailments {
-    /// Bits of Hardware Error Status that are raised while the fault lasts, and latched.
-    pub hardware_error: u8,
-    /// The shaft is blocked.
-    pub stuck: bool,
-    /// A tripped bus watchdog does not stop the motion.
-    pub watchdog_defect: bool,
-    /// Temperature that the servo reports, degrees Celsius.
-    pub temperature_c: Option<f64>,
-    /// Supply voltage that the servo reports, volts.
-    pub voltage_v: Option<f64>,
-}
 
 /// What the control loop needs of the table, taken over after each write.
 #[derive(Copy, Clone, Debug, Default)]
@@ -56,6 +40,9 @@ pub struct Servo {
     pub(super) profile: Profile,
     pub(super) setpoint: Setpoint,
     pub(super) ailments: Ailments,
+    pub(super) thermal: Thermal,
+    /// Torque that somebody outside pushes the shaft with, N m.
+    pub(super) pushed_nm: f64,
     /// Substeps integrated so far, counted from time zero.
     substep: i64,
     pub(super) booted_at: Time,
@@ -70,12 +57,15 @@ impl Servo {
     /// A servo out of the box: id 1, 57,600 baud, return delay 500 us, torque off, in the middle of the turn.
     pub fn factory(device: &'static Device) -> Self {
         let table = ControlTable::new(device);
+        let nominal_v = 0.1 * f64::from(table.get(address::PRESENT_INPUT_VOLTAGE));
         let mut servo = Self {
             table,
             motor: Motor::new(device.motor, centre_rad(device)),
             profile: Profile::default(),
             setpoint: Setpoint::default(),
             ailments: Ailments::default(),
+            thermal: Thermal::new(&device.motor, nominal_v),
+            pushed_nm: 0.0,
             substep: 0,
             booted_at: Time::ZERO,
             offline_until: Time::ZERO,
@@ -128,7 +118,12 @@ impl Servo {
 
     /// Position in pulses, unrounded, as the register would show it.
     pub fn position_pulses(&self) -> f64 {
-        self.to_pulses(self.motor.angle_rad)
+        self.to_pulses(self.measured_rad())
+    }
+
+    /// Angle of the shaft as its encoder has it, radians.
+    pub(super) fn measured_rad(&self) -> f64 {
+        self.motor.angle_rad + self.ailments.encoder_jump_rad
     }
 
     /// Angle from the middle of the turn, radians, in the register's direction.
@@ -150,15 +145,10 @@ impl Servo {
     pub fn turn_by_hand(&mut self, pulses: f64) -> bool {
         let free = !self.setpoint.torque_on;
         if free {
-            self.motor.angle_rad += pulses * PULSE_RAD * self.setpoint.direction;
+            self.motor.angle_rad += pulses * self.pulse_rad() * self.setpoint.direction;
             self.motor.speed_rad_s = 0.0;
         }
         free
-    }
-
-    /// Pushes the shaft with a torque from outside, N m, in the direction of growing pulses.
-    pub fn set_external_torque(&mut self, torque_nm: f64) {
-        self.motor.external_nm = torque_nm * self.setpoint.direction;
     }
 
     /// Whether it is up (not rebooting) at `now`.
@@ -169,13 +159,6 @@ impl Servo {
     /// Whether a hardware error is latched: the alert bit of every status.
     pub fn alert(&self) -> bool {
         self.table.get(address::HARDWARE_ERROR_STATUS) != 0
-    }
-
-    /// Sets what faults do to it from now on.
-    pub fn set_ailments(&mut self, ailments: Ailments) {
-        self.ailments = ailments;
-        self.motor.blocked = ailments.stuck;
-        self.latch_errors();
     }
 
     /// Restarts at `now`: RAM back to defaults, torque off, errors cleared, mute for [`BOOT_TIME`].
@@ -213,7 +196,8 @@ impl Servo {
         self.goals_to_limits();
         self.take_setpoint();
         self.clear_turns();
-        self.latch_errors();
+        self.thermal.restart();
+        self.raise(self.ailments.hardware_error);
     }
 
     pub(super) fn take_setpoint(&mut self) {
@@ -294,9 +278,9 @@ impl Servo {
         self.table.get(address::HARDWARE_ERROR_STATUS) & self.table.get(address::SHUTDOWN) != 0
     }
 
-    fn latch_errors(&mut self) {
-        let latched = self.table.get(address::HARDWARE_ERROR_STATUS)
-            | u32::from(self.ailments.hardware_error);
+    /// Latches bits of Hardware Error Status, and shuts down for those of the Shutdown mask.
+    pub(super) fn raise(&mut self, bits: u8) {
+        let latched = self.table.get(address::HARDWARE_ERROR_STATUS) | u32::from(bits);
         self.table
             .set(address::HARDWARE_ERROR_STATUS, i64::from(latched));
         if self.shut_down() {
@@ -315,12 +299,16 @@ impl Servo {
             .then(|| self.fed_at + Duration::from_millis(20 * counts.unsigned_abs() as u64))
     }
 
-    fn trip_watchdog(&mut self) {
+    pub(super) fn trip_watchdog(&mut self) {
         self.table.set(address::BUS_WATCHDOG, -1);
         if self.ailments.watchdog_defect {
             return;
         }
         let pulses = self.position_pulses().round() as i64;
+        if let Some(astray) = self.ailments.watchdog_runaway {
+            self.run_away(pulses, astray);
+            return;
+        }
         self.table.set(address::GOAL_POSITION, pulses);
         self.table.set(address::GOAL_VELOCITY, 0);
         match self.setpoint.mode {
@@ -340,10 +328,17 @@ impl Servo {
         while self.substep < target {
             let settled = self.control();
             self.motor.step(settled.duty);
-            self.substep += 1;
+            let to_tick = TICK_SUBSTEPS - self.substep.rem_euclid(TICK_SUBSTEPS);
+            let mut steps = 1;
             if settled.path_ended && self.motor.rests(settled.duty) {
-                // Nothing will change until the next write or fault.
-                self.substep = target;
+                // Nothing but heat will change until the next write or fault.
+                steps = to_tick.min(target - self.substep);
+            }
+            self.substep += steps;
+            let effort = self.motor.effort();
+            self.thermal.count(effort, self.motor.duty, steps);
+            if steps == to_tick {
+                self.feel();
             }
         }
     }
@@ -369,13 +364,14 @@ impl Servo {
             16 => (s.goal_duty, true),
             _ => {
                 self.profile.step(s.goal_rad, s.speed, s.acceleration);
-                let error = self.profile.angle_rad - self.motor.angle_rad;
+                let error = self.profile.angle_rad - self.measured_rad();
                 let duty = self.within_current(error * s.duty_per_rad);
                 (duty, self.profile.arrived(s.goal_rad))
             }
         };
+        let most = s.duty_limit.min(self.ailments.duty_limit.unwrap_or(1.0));
         Control {
-            duty: Some(duty.clamp(-s.duty_limit, s.duty_limit)),
+            duty: Some(duty.clamp(-most, most)),
             path_ended,
         }
     }

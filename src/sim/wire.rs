@@ -21,16 +21,32 @@ impl Pace {
     }
 }
 
+/// A byte on its way to the host.
+#[derive(Copy, Clone, Debug)]
+struct Cell {
+    /// When it ends on the line.
+    at: Time,
+    /// When the adapter hands it to the host.
+    arrives: Time,
+    byte: u8,
+}
+
 /// Bytes that the host will receive, in the order of their times.
 #[derive(Debug)]
 pub(super) struct Wire {
-    bytes: VecDeque<(Time, u8)>,
+    bytes: VecDeque<Cell>,
+    /// From the line to the host.
+    pub delay: Duration,
+    /// Probability with which a byte is lost on that way.
+    pub loss: f64,
 }
 
 impl Wire {
-    pub fn new() -> Self {
+    pub fn new(delay: Duration) -> Self {
         Self {
             bytes: VecDeque::with_capacity(8192),
+            delay,
+            loss: 0.0,
         }
     }
 
@@ -41,12 +57,19 @@ impl Wire {
         for (index, &byte) in bytes.iter().enumerate() {
             let at = start + pace.bytes(index + 1);
             let byte = match self.collide(at, pace, chance) {
-                true => byte ^ flip(chance),
+                true => byte ^ chance.flips(),
                 false => byte,
             };
-            let behind = self.bytes.iter().rev().take_while(|(t, _)| *t > at);
+            if self.loss > 0.0 && chance.happens(self.loss) {
+                continue;
+            }
+            let behind = self.bytes.iter().rev().take_while(|cell| cell.at > at);
             let place = self.bytes.len() - behind.count();
-            self.bytes.insert(place, (at, byte));
+            let before = place.checked_sub(1).and_then(|i| self.bytes.get(i));
+            // An adapter does not change the order, also when its delay becomes shorter.
+            let arrives = before.map_or(Time::from_nanos(i64::MIN), |cell| cell.arrives);
+            let arrives = arrives.max(at + self.delay);
+            self.bytes.insert(place, Cell { at, arrives, byte });
         }
         start + pace.bytes(bytes.len())
     }
@@ -59,27 +82,25 @@ impl Wire {
         let (from, to) = (at - touching, at + touching);
         let mut any = false;
         let later = self.bytes.iter_mut().rev();
-        for (_, byte) in later
-            .skip_while(|(t, _)| *t >= to)
-            .take_while(|(t, _)| *t > from)
+        for cell in later
+            .skip_while(|cell| cell.at >= to)
+            .take_while(|cell| cell.at > from)
         {
-            *byte ^= flip(chance);
+            cell.byte ^= chance.flips();
             any = true;
         }
         any
     }
 
-    /// When the byte that is `index` places from the next one ends.
-    pub fn time_of(&self, index: usize) -> Option<Time> {
-        self.bytes.get(index).map(|(t, _)| *t)
+    /// When the byte that is `index` places from the next one arrives at the host.
+    pub fn arrival(&self, index: usize) -> Option<Time> {
+        self.bytes.get(index).map(|cell| cell.arrives)
     }
 
-    /// Takes the next byte if it has ended by `now`.
+    /// Takes the next byte if it has arrived by `now`.
     pub fn pop(&mut self, now: Time) -> Option<u8> {
-        let (at, byte) = *self.bytes.front()?;
-        if at > now {
-            return None;
-        }
+        let next = self.bytes.front().filter(|cell| cell.arrives <= now)?;
+        let byte = next.byte;
         self.bytes.pop_front();
         Some(byte)
     }
@@ -88,11 +109,6 @@ impl Wire {
     pub fn clear(&mut self) {
         self.bytes.clear();
     }
-}
-
-/// A mask with one to eight bits set.
-fn flip(chance: &mut Chance) -> u8 {
-    (chance.bits() as u8) | 1
 }
 
 #[cfg(test)]
@@ -104,7 +120,7 @@ mod tests {
         let pace = Pace {
             baud: Some(3_000_000),
         };
-        let (mut wire, mut chance) = (Wire::new(), Chance::new(1));
+        let (mut wire, mut chance) = (Wire::new(Duration::ZERO), Chance::new(1));
         let end = wire.send(Time::ZERO, &[1; 50], pace, &mut chance);
         wire.send(end, &[2; 50], pace, &mut chance);
         wire.send(Time::ZERO + pace.bytes(70), &[3; 2], pace, &mut chance);
@@ -119,7 +135,7 @@ mod tests {
 
     #[test]
     fn without_pace_nothing_takes_time_and_nothing_collides() {
-        let (mut wire, mut chance) = (Wire::new(), Chance::new(1));
+        let (mut wire, mut chance) = (Wire::new(Duration::ZERO), Chance::new(1));
         let pace = Pace { baud: None };
         assert_eq!(
             wire.send(Time::ZERO, &[1, 2], pace, &mut chance),

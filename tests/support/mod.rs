@@ -1,6 +1,7 @@
 //! What integration tests share, one module per concern.
 #![allow(dead_code, reason = "each test program uses a part")]
 
+pub mod bench;
 pub mod character;
 pub mod counting;
 pub mod data;
@@ -10,6 +11,7 @@ pub mod motion;
 pub mod program;
 pub mod recipe;
 pub mod rig;
+pub mod scenario;
 pub mod simulator;
 pub mod spectrum;
 pub mod targets;

@@ -15,6 +15,29 @@ const DRIVE_MODE_FOREIGN: u8 = 0b101;
 /// Drive mode bit 3: a goal turns torque on.
 const TORQUE_ON_BY_GOAL: u8 = 0b1000;
 
+impl Servo {
+    /// Keeps where it is, in counts that can be believed: without torque it may have lost count of its turns, and jumps then.
+    pub(super) fn stands_at(&mut self, pulse: i32) {
+        let believed = match self.link {
+            Link::Driven | Link::Ramping => true,
+            Link::Torqueless | Link::Silent => false,
+            Link::Resting => !self.lost_turns(pulse),
+        };
+        if believed {
+            self.last_pulse = Some(pulse);
+        }
+    }
+
+    /// Whether it may make several turns and `pulse` is more than half a turn from where it was last.
+    fn lost_turns(&self, pulse: i32) -> bool {
+        let turn = self.spec.model.pulses_per_turn as u32;
+        self.last_pulse.is_some_and(|last| {
+            self.spec.max_pulse.abs_diff(self.spec.min_pulse) >= turn
+                && pulse.abs_diff(last) > turn / 2
+        })
+    }
+}
+
 impl DynamixelChain {
     /// Looks at every servo and reads all present states; changes no torque and no EEPROM.
     pub(super) fn check_all(&mut self, states: &mut [JointState]) -> Result<(), BusError> {
@@ -217,13 +240,9 @@ impl DynamixelChain {
                     .into(),
             ));
         }
-        let turn = spec.model.pulses_per_turn as i32;
-        let Some(last) = last_pulse.filter(|_| spec.max_pulse - spec.min_pulse >= turn) else {
+        let Some(last) = last_pulse.filter(|_| self.servos[index].lost_turns(pulse)) else {
             return Ok(());
         };
-        if pulse.abs_diff(last) <= turn.unsigned_abs() / 2 {
-            return Ok(());
-        }
         // After a reboot or without power a servo counts from within one turn again.
         Err(self.servo_problem(
             index,

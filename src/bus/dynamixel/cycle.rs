@@ -199,7 +199,7 @@ impl DynamixelChain {
     fn take_states(&mut self, states: &mut [JointState], report: &mut CycleReport) {
         let now = self.client.now();
         let scratch = &mut self.scratch;
-        let mut kept = 0;
+        let (mut kept, mut damaged) = (0, 0);
         for place in 0..scratch.ids.len() {
             let index = scratch.indices[place];
             match scratch.outcomes[place] {
@@ -210,7 +210,7 @@ impl DynamixelChain {
                         .zip(states.get_mut(index))
                     {
                         *state = self.servos[index].spec.state(registers, now);
-                        self.servos[index].last_pulse = Some(position_pulse(registers));
+                        self.servos[index].stands_at(position_pulse(registers));
                     }
                     self.servos[index].fresh = true;
                     report.fresh = report.fresh.saturating_add(1);
@@ -224,6 +224,11 @@ impl DynamixelChain {
                 Outcome::Damaged | Outcome::NotReached => {
                     scratch.ids[kept] = scratch.ids[place];
                     scratch.indices[kept] = index;
+                    // Who damages its answer each time would take those behind it along again: the damaged
+                    // come last, and the first of them, who may have damaged the next, at the very end.
+                    scratch.ids[kept - damaged..=kept].rotate_right(1);
+                    scratch.indices[kept - damaged..=kept].rotate_right(1);
+                    damaged += usize::from(scratch.outcomes[place] == Outcome::Damaged);
                     kept += 1;
                 }
             }

@@ -165,6 +165,8 @@ pub struct Model {
     pub pulses_per_turn: f64,
     /// Count in the middle of the turn.
     pub centre_pulse: i32,
+    /// Least and greatest position out of the box, in counts: a whole turn, or a hair less.
+    pub turn_pulses: (i32, i32),
     /// One count of velocity, in rad/s.
     pub velocity_unit_rad_s: f64,
     /// One count of profile acceleration, in rad/s2.

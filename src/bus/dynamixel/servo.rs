@@ -126,7 +126,7 @@ impl fmt::Display for Names<'_> {
 impl ServoSpec {
     /// A servo of `model` in position mode whose joint is 0 in the middle of the turn and may use the whole turn.
     pub fn new(id: u8, joint: impl Into<String>, model: &'static Model) -> Self {
-        let (min_pulse, max_pulse) = model.goal_range(Mode::Position);
+        let (min_pulse, max_pulse) = model.turn_pulses;
         ServoSpec {
             id,
             joint: joint.into(),
@@ -342,7 +342,7 @@ mod tests {
         }
         let fine = Model::by_name("ph42-020-s300").expect("a known model");
         let spec = ServoSpec::new(1, "hip", fine);
-        assert_eq!((spec.min_pulse, spec.max_pulse), (-303_750, 303_750));
+        assert_eq!((spec.min_pulse, spec.max_pulse), (-303_454, 303_454));
         assert_eq!(spec.goal_pulse(FRAC_PI_2), Some(151_875));
     }
 

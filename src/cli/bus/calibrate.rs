@@ -197,6 +197,19 @@ fn write(
     Ok(())
 }
 
+/// Where a joint's far end is when all joints are at zero.
+fn zero_place(character: &Character, joint: &str) -> String {
+    let index = character.joints.iter().position(|name| name == joint);
+    let rest = vec![0.0; character.joints.len()];
+    match character.model.as_ref().zip(index) {
+        Some((model, index)) => match model.far_end(index, &rest) {
+            place if place.is_empty() => String::new(),
+            place => format!(" (with all joints at 0 {place})"),
+        },
+        None => String::new(),
+    }
+}
+
 /// What the positive direction of a joint does.
 fn way(character: &Character, joint: &str) -> String {
     let index = character.joints.iter().position(|name| name == joint);
@@ -220,7 +233,7 @@ impl Hands {
         let (answer, hand) = self.moved(
             out,
             old,
-            "  zero: move it to where its URDF has position 0, and press Enter (s skips this joint): ",
+            &format!("  zero: move it to where its URDF has position 0{}. Then press Enter (s skips this joint): ", zero_place(character, &old.joint)),
         )?;
         if answer == "s" {
             return Ok(None);

@@ -110,6 +110,7 @@ pub fn play(args: &PlayArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
         return Err(Failure::input("nothing was moved"));
     }
     drive.arm().map_err(failure)?;
+    say(out, "moving; Ctrl-C brakes and turns torque off")?;
     let mut behind: f64 = 0.0;
     let mut run = || -> Result<bool, DriveError> {
         let mut part = |name: &str, duration_s: f64, pose: &dyn Fn(f64) -> Vec<f64>| {

@@ -1,17 +1,20 @@
 //! `handwave bus scan` and `handwave bus ping`: who is there.
 
+use super::setup::progress;
 use super::{IdList, model_name, open, say};
 use crate::base::print::warn;
 use crate::bus::BusAddress;
 use crate::bus::address::parse_baud;
-use crate::bus::dynamixel::{Client, ClientError, Ping};
+use crate::bus::dynamixel::setup::sweep;
+use crate::bus::dynamixel::vitals::Vitals;
+use crate::bus::dynamixel::{Model, Ping};
 use crate::cli::{ExitStatus, Failure};
 use clap::Args;
 use handwave_dynamixel::baud::RATES;
 use serde_json::json;
 use std::io::Write;
 
-/// Find the servos that answer. Without --ids by one broadcast, a second or two per baud rate.
+/// Find the servos that answer, with voltage, temperature and latched errors. Without --ids by one broadcast, a second or two per baud rate.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -66,20 +69,26 @@ pub fn scan(args: &ScanArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
             }
             Err(error) => return Err(error.into()),
         }
-        let found = match &args.ids {
-            None => {
-                let mut found = Vec::new();
-                client.ping_all(&mut |ping| found.push(ping))?;
-                found
-            }
-            Some(ids) => ping_each(&mut *client, ids)?,
-        };
-        for ping in &found {
+        let ids: Option<Vec<u8>> = args.ids.as_ref().map(|ids| ids.iter().collect());
+        progress(Some(format_args!("looking at {rate} baud")));
+        let swept = sweep(&mut *client, &[rate], ids.as_deref(), &mut |_| true);
+        progress(None);
+        let swept = swept?;
+        for found in &swept.found {
             if total == 0 && !args.json {
-                say(out, "  id  model        firmware     baud  alert")?;
+                say(out, "  id  model        firmware     baud     V   C  error")?;
             }
             total += 1;
-            row(out, ping, rate, args.json)?;
+            let health = Model::by_number(found.ping.model)
+                .and_then(|model| Vitals::read(&mut *client, found.ping.id, model).ok());
+            row(out, &found.ping, rate, health.as_ref(), args.json)?;
+            if found.garbled {
+                talk_over(&format!("id {} at {rate} baud", found.ping.id), &args.bus);
+            }
+        }
+        if !swept.noise.is_empty() {
+            total += 1;
+            talk_over(&format!("an id at {rate} baud"), &args.bus);
         }
     }
     if total > 0 {
@@ -96,24 +105,19 @@ pub fn scan(args: &ScanArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
     )))
 }
 
-fn ping_each(client: &mut dyn Client, ids: &IdList) -> Result<Vec<Ping>, ClientError> {
-    let mut found = Vec::new();
-    for id in ids.iter() {
-        match client.ping(id) {
-            Ok(ping) => found.push(ping),
-            Err(ClientError::Port(error)) => return Err(error.into()),
-            // Nobody there, or nobody that speaks clearly.
-            Err(_) => {}
-        }
-    }
-    Ok(found)
+/// Says that several servos share an id, and what to do.
+fn talk_over(place: &str, bus: &BusAddress) {
+    warn(format_args!(
+        "handwave: several servos seem to answer to {place}: their words come damaged. Unplug all of them but one, \
+         give it an id of its own by `handwave bus setup --id N {bus}`, then the next"
+    ));
 }
 
 pub fn ping(args: &PingArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure> {
     let mut client = open(&args.bus)?;
     let ping = client.ping(args.id)?;
     if args.json {
-        row(out, &ping, client.baud(), true)?;
+        row(out, &ping, client.baud(), None, true)?;
     } else {
         let alert = if ping.alert {
             ", hardware error latched"
@@ -134,8 +138,16 @@ pub fn ping(args: &PingArgs, out: &mut dyn Write) -> Result<ExitStatus, Failure>
     Ok(ExitStatus::Done)
 }
 
-fn row(out: &mut dyn Write, ping: &Ping, baud: u32, as_json: bool) -> Result<(), Failure> {
+fn row(
+    out: &mut dyn Write,
+    ping: &Ping,
+    baud: u32,
+    health: Option<&Vitals>,
+    as_json: bool,
+) -> Result<(), Failure> {
     let name = model_name(ping.model);
+    let voltage = health.and_then(|vitals| vitals.voltage_v);
+    let temperature = health.and_then(|vitals| vitals.temperature_c);
     if as_json {
         let row = json!({
             "id": ping.id,
@@ -144,13 +156,26 @@ fn row(out: &mut dyn Write, ping: &Ping, baud: u32, as_json: bool) -> Result<(),
             "firmware": ping.firmware,
             "baud": baud,
             "alert": ping.alert,
+            "voltage_v": voltage.map(|v| (v * 10.0).round() / 10.0),
+            "temperature_c": temperature,
+            "hardware_error": health.map(|vitals| vitals.errors),
         });
         return say(out, row);
     }
-    let alert = if ping.alert { "yes" } else { "" };
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or(String::new(), |value| format!("{value:.digits$}"))
+    };
+    let errors = match (health.map(Vitals::error_names), ping.alert) {
+        (Some(names), _) if !names.is_empty() => names,
+        (_, true) => "hardware error latched".into(),
+        (_, false) => String::new(),
+    };
     let line = format!(
-        "{:>4}  {name:<11}  {:>8}  {baud:>7}  {alert}",
-        ping.id, ping.firmware
+        "{:>4}  {name:<11}  {:>8}  {baud:>7}  {:>4}  {:>2}  {errors}",
+        ping.id,
+        ping.firmware,
+        number(voltage, 1),
+        number(temperature, 0)
     );
     say(out, line.trim_end())
 }

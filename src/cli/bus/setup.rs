@@ -1,18 +1,21 @@
 //! `handwave bus setup`: new servos out of the box become those of a chain, one at a time; and back again.
 
+mod back;
+mod posts;
+
 use super::ask::{Ask, interrupted, prompt};
-use super::{crew, model_name, open, say};
+use super::{model_name, open, say};
 use crate::bus::BusAddress;
 use crate::bus::address::parse_baud;
-use crate::bus::dynamixel::setup::work::locate;
 use crate::bus::dynamixel::setup::{
-    Change, Found, Halt, Place, SetupError, Sweep, UndoEntry, UndoFile, Wanted, commission, plan,
-    restore, sweep,
+    Change, ChooseError, Found, Halt, Place, SetupError, Sweep, UndoEntry, UndoFile, choose,
+    commission, plan, sweep, undo,
 };
-use crate::bus::dynamixel::{Client, Model, ServoSpec};
+use crate::bus::dynamixel::{Client, ClientError, Model};
 use crate::cli::{ExitStatus, Failure};
 use clap::Args;
 use handwave_dynamixel::baud::RATES;
+use posts::{Post, parse_limits, parse_rates, posts};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -67,42 +70,6 @@ pub struct SetupArgs {
     /// Ask nothing.
     #[arg(long)]
     yes: bool,
-}
-
-fn parse_limits(text: &str) -> Result<(i32, i32), String> {
-    let parsed = text
-        .split_once('-')
-        .and_then(|(min, max)| Some((min.trim().parse().ok()?, max.trim().parse().ok()?)));
-    parsed
-        .filter(|(min, max)| min < max)
-        .ok_or_else(|| format!("'{text}' is no range of pulses such as 1024-3072"))
-}
-
-fn parse_rates(text: &str, target: u32) -> Result<Vec<u32>, Failure> {
-    let mut rates = match text {
-        // Where it is most likely first.
-        "all" => [&[target, 57_600][..], &RATES].concat(),
-        list => list
-            .split(',')
-            .map(|rate| parse_baud(rate.trim()))
-            .collect::<Result<_, _>>()?,
-    };
-    let mut seen = Vec::new();
-    rates.retain(|rate| {
-        !seen.contains(rate) && {
-            seen.push(*rate);
-            true
-        }
-    });
-    Ok(rates)
-}
-
-/// One servo's place in the plan: what it is to become, and for what.
-struct Post {
-    /// `joint1 (servo 11)` or `servo 3`.
-    name: String,
-    model: Option<&'static Model>,
-    wanted: Wanted,
 }
 
 /// The tools of the work.
@@ -170,46 +137,6 @@ pub fn setup(args: &SetupArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
     Ok(ExitStatus::Done)
 }
 
-/// What the servos are to become.
-fn posts(args: &SetupArgs, baud: u32) -> Result<Vec<Post>, Failure> {
-    if args.undo.is_some() {
-        return Ok(Vec::new());
-    }
-    let Some(config) = &args.config else {
-        let id = args.id.unwrap_or(1);
-        return Ok(vec![Post {
-            name: format!("servo {id}"),
-            model: None,
-            wanted: Wanted {
-                id,
-                baud,
-                limits: args.limits,
-                zero_here: args.zero_here,
-            },
-        }]);
-    };
-    let character = crew::character(config)?;
-    let known = |name: &String| character.servos.iter().any(|s| s.joint == *name);
-    if let Some(unknown) = args.joint.iter().find(|name| !known(name)) {
-        return Err(Failure::input(format_args!(
-            "--joint {unknown}: {} has no such joint. Joints: {}",
-            config.display(),
-            character.joints.join(", ")
-        )));
-    }
-    let post = |spec: &ServoSpec| Post {
-        name: format!("{} (servo {})", spec.joint, spec.id),
-        model: Some(spec.model),
-        wanted: Wanted {
-            id: spec.id,
-            baud,
-            limits: Some((spec.min_pulse, spec.max_pulse)),
-            zero_here: args.zero_here,
-        },
-    };
-    Ok(character.servos.iter().map(post).collect())
-}
-
 impl Bench<'_> {
     /// Goes through the joints of a configuration.
     fn guided(&mut self, posts: &[Post], out: &mut dyn Write) -> Result<(), Failure> {
@@ -226,9 +153,12 @@ impl Bench<'_> {
         say(
             out,
             format_args!(
-                "{} servos to set up for {} baud. One at a time: a new servo answers to the same id as every other new one.\n\
+                "{} for {} baud. One at a time: a new servo answers to the same id as every other new one.\n\
                  What stood in them before goes into {}.",
-                todo.len(),
+                match todo.len() {
+                    1 => "1 servo to set up".to_owned(),
+                    n => format!("{n} servos to set up"),
+                },
                 self.baud,
                 self.args.undo_file.display()
             ),
@@ -243,16 +173,24 @@ impl Bench<'_> {
                 .found
                 .iter()
                 .find(|f| f.ping.id == place.id && !f.garbled);
-            let complete = match here {
-                Some(found) => self.changes(found, post)?.is_empty(),
-                None => false,
-            };
             let head = format!("\n{} of {}: {}", number + 1, todo.len(), post.name);
-            if complete {
-                say(out, format_args!("{head} is set up already"))?;
-                continue;
+            if let Some(found) = here {
+                if self.changes(found, post).map_err(failure)?.is_empty() {
+                    say(out, format_args!("{head} is set up already"))?;
+                    continue;
+                }
+                // It is this joint's already, only not as it should be.
+                say(out, format_args!("{head} is there and differs"))?;
+                match self.make(post, found, out)? {
+                    Outcome::Done => continue,
+                    Outcome::Again(problem) if self.ask.is_silent() => {
+                        return Err(Failure::bus(problem));
+                    }
+                    Outcome::Again(problem) => say(out, format_args!("  {problem}"))?,
+                }
+            } else {
+                say(out, head)?;
             }
-            say(out, head)?;
             loop {
                 if !self.ask.is_silent() {
                     let what = post.model.map_or("servo", |model| model.name);
@@ -288,10 +226,23 @@ impl Bench<'_> {
     fn one(&mut self, post: &Post, out: &mut dyn Write) -> Result<Outcome, Failure> {
         let rates = self.rates.clone();
         let swept = self.look(&rates)?;
-        let found = match self.choose(&swept, post) {
-            Ok(found) => found,
-            Err(problem) => return Ok(Outcome::Again(problem)),
-        };
+        let crew = self.args.config.as_ref().map(|_| self.crew.as_slice());
+        match choose(&swept, &post.wanted, crew) {
+            Ok(found) => self.make(post, &found, out),
+            Err(ChooseError::Nobody) if self.rates.len() < RATES.len() => Ok(Outcome::Again(
+                format!("{}; --at all looks at every baud rate", ChooseError::Nobody),
+            )),
+            Err(problem) => Ok(Outcome::Again(problem.to_string())),
+        }
+    }
+
+    /// Makes the servo that was found what `post` says.
+    fn make(
+        &mut self,
+        post: &Post,
+        found: &Found,
+        out: &mut dyn Write,
+    ) -> Result<Outcome, Failure> {
         let name = model_name(found.ping.model);
         say(
             out,
@@ -314,7 +265,15 @@ impl Bench<'_> {
                 self.args.bus
             )));
         }
-        let changes = self.changes(&found, post)?;
+        let changes = match self.changes(found, post) {
+            Ok(changes) => changes,
+            Err(SetupError::Client(ClientError::Timeout { .. })) => {
+                return Ok(Outcome::Again(
+                    "it has fallen silent meanwhile. Check its cable".into(),
+                ));
+            }
+            Err(error) => return Err(failure(error)),
+        };
         if changes.is_empty() {
             say(out, format_args!("  {} is as it should be", post.name))?;
             return Ok(Outcome::Done);
@@ -350,81 +309,6 @@ impl Bench<'_> {
         }
     }
 
-    /// Which servo is the new one; else what to do about it.
-    fn choose(&self, swept: &Sweep, post: &Post) -> Result<Found, String> {
-        let wanted = post.wanted;
-        let list = |found: &[Found]| {
-            let names: Vec<String> = found
-                .iter()
-                .map(|f| {
-                    format!(
-                        "{} {} at {} baud",
-                        model_name(f.ping.model),
-                        f.ping.id,
-                        f.baud
-                    )
-                })
-                .collect();
-            names.join(", ")
-        };
-        if swept.collisions() {
-            let mut at: Vec<String> = swept
-                .noise
-                .iter()
-                .map(|baud| format!("at {baud} baud"))
-                .collect();
-            at.extend(
-                swept
-                    .found
-                    .iter()
-                    .filter(|f| f.garbled)
-                    .map(|f| format!("id {} at {} baud", f.ping.id, f.baud)),
-            );
-            return Err(format!(
-                "several servos answer at once ({}) and damage each other's words: they have the same id. Unplug all of them but one",
-                at.join(", ")
-            ));
-        }
-        let there = |f: &&Found| f.ping.id == wanted.id && f.baud == wanted.baud;
-        let known = |f: &Found| {
-            f.baud == wanted.baud && (self.args.config.is_none() || self.crew.contains(&f.ping.id))
-        };
-        let strangers: Vec<Found> = swept.found.iter().filter(|f| !known(f)).copied().collect();
-        match (swept.found.as_slice(), strangers.as_slice()) {
-            ([], _) => Err(format!(
-                "no servo answers. Check its power (the LED blinks once at power-up) and its cable{}",
-                if self.rates.len() < RATES.len() {
-                    "; --at all looks at every baud rate"
-                } else {
-                    ""
-                }
-            )),
-            // The only one there is meant, unless it is another's of this chain.
-            ([only], _) if there(&only) || self.args.config.is_none() || !known(only) => Ok(*only),
-            (_, [new]) => match swept.found.iter().find(there) {
-                Some(_) => Err(format!(
-                    "id {} at {} baud is taken already, and {} is new here. Unplug the one that has the id to replace it, or give the new one another",
-                    wanted.id,
-                    wanted.baud,
-                    list(&[*new])
-                )),
-                None => Ok(*new),
-            },
-            (_, []) => match swept.found.iter().find(there) {
-                Some(found) if self.args.config.is_some() => Ok(*found),
-                _ => Err(format!(
-                    "no new servo is among those that answer: {}. Plug the new one in, or unplug all but the one that is meant",
-                    list(&swept.found)
-                )),
-            },
-            (_, several) => Err(format!(
-                "{} servos answer that are not set up: {}. Unplug all of them but one",
-                several.len(),
-                list(several)
-            )),
-        }
-    }
-
     fn look(&mut self, rates: &[u32]) -> Result<Sweep, Failure> {
         let ask = &self.ask;
         let swept = sweep(&mut *self.client, rates, None, &mut |baud| {
@@ -441,19 +325,17 @@ impl Bench<'_> {
         Ok(swept)
     }
 
-    fn changes(&mut self, found: &Found, post: &Post) -> Result<Vec<Change>, Failure> {
-        let model = Model::by_number(found.ping.model).ok_or_else(|| {
-            Failure::input(SetupError::UnknownModel {
-                id: found.ping.id,
-                number: found.ping.model,
-            })
-        })?;
-        self.client.set_baud(found.baud)?;
+    fn changes(&mut self, found: &Found, post: &Post) -> Result<Vec<Change>, SetupError> {
         let place = Place {
             id: found.ping.id,
             baud: found.baud,
         };
-        plan(&mut *self.client, place, model, &post.wanted).map_err(failure)
+        let model = Model::by_number(found.ping.model).ok_or(SetupError::UnknownModel {
+            id: place.id,
+            number: found.ping.model,
+        })?;
+        self.client.set_baud(place.baud)?;
+        plan(&mut *self.client, place, model, &post.wanted)
     }
 
     fn write(&mut self, place: Place, model: &str, changes: &[Change]) -> Result<Place, Halt> {
@@ -499,66 +381,10 @@ impl Bench<'_> {
         );
         match &halt.reason {
             SetupError::Stopped => Err(interrupted(text)),
-            SetupError::Client(crate::bus::dynamixel::ClientError::Port(_))
-            | SetupError::File { .. } => Err(Failure::bus(text)),
+            SetupError::Client(ClientError::Port(_)) | SetupError::File { .. } => {
+                Err(Failure::bus(text))
+            }
             _ => Ok(Outcome::Again(text)),
-        }
-    }
-
-    /// Puts back what the undo file says.
-    fn undo(&mut self, file: &UndoFile, out: &mut dyn Write) -> Result<(), Failure> {
-        let mut groups = file.groups().map_err(Failure::input)?;
-        if let Some(id) = self.args.id {
-            groups.retain(|group| group.place().id == id);
-        }
-        let ids: Vec<String> = groups.iter().map(|g| g.place().id.to_string()).collect();
-        let group = match groups.as_slice() {
-            [group] => group,
-            [] => {
-                return Err(Failure::input(
-                    "there is nothing in this file that could be undone",
-                ));
-            }
-            _ => {
-                return Err(Failure::input(format_args!(
-                    "this file has changes of several servos, now {}. One at a time: --id N, and only that servo plugged in",
-                    ids.join(", ")
-                )));
-            }
-        };
-        let id = group.place().id;
-        let found = locate(&mut *self.client, group)?;
-        let Some(place) = found else {
-            return Err(Failure::bus(format_args!(
-                "servo {id} ({}) does not answer at {}, nor where it was before. Plug it in",
-                group.model,
-                group.place()
-            )));
-        };
-        let model = Model::by_name(&group.model)
-            .ok_or_else(|| Failure::input(format_args!("unknown model {}", group.model)))?;
-        say(out, format_args!("  {} is {place}; back to:", group.model))?;
-        for entry in group.entries.iter().rev() {
-            say(
-                out,
-                format_args!("    {:<22} {:>7}", entry.register, entry.old),
-            )?;
-        }
-        if !self.ask.confirm(out, "  Write these?", true)? {
-            return Err(Failure::input("nothing was written"));
-        }
-        match restore(&mut *self.client, place, model, group) {
-            Ok((count, place)) => {
-                file.note_undone(id).map_err(Failure::bus)?;
-                say(
-                    out,
-                    format_args!("  {count} registers put back and read: the servo is {place}"),
-                )
-            }
-            Err(halt) => Err(Failure::bus(format_args!(
-                "{}. The servo is {}; {} registers are put back. The same command goes on from there",
-                halt.reason, halt.place, halt.done
-            ))),
         }
     }
 }
@@ -598,52 +424,5 @@ fn failure(error: SetupError) -> Failure {
 /// The time now as `2026-11-25T08:15:02Z`.
 fn utc_now() -> String {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    utc(now.map_or(0, |since| since.as_secs()))
-}
-
-/// Days to a date as in Howard Hinnant's `civil_from_days`.
-fn utc(seconds: u64) -> String {
-    let (days, second) = (seconds / 86_400, seconds % 86_400);
-    let z = days + 719_468;
-    let era = z / 146_097;
-    let day_of_era = z % 146_097;
-    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
-    let month = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month + 2) / 5 + 1;
-    let month = if month < 10 { month + 3 } else { month - 9 };
-    let year = year + era * 400 + u64::from(month <= 2);
-    let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
-    format!("{year:04}-{month:02}-{day:02}T{h:02}:{m:02}:{s:02}Z")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_are_dates() {
-        assert_eq!(utc(0), "1970-01-01T00:00:00Z");
-        assert_eq!(utc(951_827_696), "2000-02-29T12:34:56Z");
-        assert_eq!(utc(1_764_059_301), "2025-11-25T08:28:21Z");
-    }
-
-    #[test]
-    fn rates_to_look_at_come_once_and_likely_ones_first() {
-        let all = parse_rates("all", 1_000_000).expect("a good list");
-        assert_eq!((all[0], all[1], all.len()), (1_000_000, 57_600, 8));
-        assert_eq!(
-            parse_rates("57600, 115200", 1).expect("a good list"),
-            [57_600, 115_200]
-        );
-        assert!(parse_rates("fast", 1).is_err());
-    }
-
-    #[test]
-    fn limits_as_users_write_them() {
-        assert_eq!(parse_limits("1024-3072"), Ok((1024, 3072)));
-        for wrong in ["", "1024", "3072-1024", "a-b"] {
-            assert!(parse_limits(wrong).is_err(), "'{wrong}' was taken");
-        }
-    }
+    undo::utc(now.map_or(0, |since| since.as_secs()))
 }

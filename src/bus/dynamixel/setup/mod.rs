@@ -1,15 +1,18 @@
 //! Setting servos up for a chain, one at a time: find the new one, see what differs, write it, be able to undo it.
 //!
-//! [`find`] looks over baud rates and ids and notices servos that talk over each other, [`plan`] compares
+//! [`find`] looks over baud rates and ids and notices servos that talk over each other, [`mod@choose`] says which of them
+//! is the new one, [`mod@plan`] compares
 //! a servo with what is wanted of it, [`work`] writes and reads back, [`undo`] keeps what stood there before,
 //! [`calibrate`] learns zero, direction and range of a joint from movements by hand.
 
 pub mod calibrate;
+pub mod choose;
 pub mod find;
 pub mod plan;
 pub mod undo;
 pub mod work;
 
+pub use choose::{ChooseError, choose};
 pub use find::{Found, Sweep, sweep};
 pub use plan::{Change, Wanted, plan};
 pub use undo::{UndoEntry, UndoFile, UndoGroup};

@@ -5,9 +5,14 @@ use super::work::Place;
 use crate::bus::dynamixel::client::{Client, ClientError};
 use crate::bus::dynamixel::model::{Model, POSITION_MODE, Register};
 use handwave_dynamixel::baud;
+use std::time::Duration;
 
 /// An offset beyond this is ignored by servos in position mode, pulses.
 const MAX_OFFSET: i64 = 1024;
+/// How often a register is asked for before its servo counts as silent.
+const TRIES: usize = 4;
+/// Between two tries the line is listened to until it was quiet this long.
+const QUIET: Duration = Duration::from_millis(5);
 
 /// What is wanted of a servo, beside what every servo of a chain needs: position mode, no return delay,
 /// an answer to everything (status return level 2), torque off at power-up, no second id, no reversal of its own.
@@ -49,7 +54,15 @@ pub fn value(
     };
     let mut bytes = [0; 4];
     let bytes = &mut bytes[..usize::from(register.size).min(4)];
-    client.read(id, register.address, bytes)?;
+    let mut tries = 1;
+    while let Err(error) = client.read(id, register.address, bytes) {
+        match error {
+            // A lost answer, or one that a busy system handed over late.
+            ClientError::Timeout { .. } if tries < TRIES => tries += 1,
+            other => return Err(other),
+        }
+        client.settle(QUIET)?;
+    }
     Ok(Some((register, register.decode(bytes))))
 }
 

@@ -184,6 +184,22 @@ fn repeats(group: &UndoGroup, entry: &UndoEntry) -> bool {
     })
 }
 
+/// Seconds since 1970 as `2026-11-25T08:15:02Z`; days become a date as in Howard Hinnant's `civil_from_days`.
+pub fn utc(seconds: u64) -> String {
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    let z = days + 719_468;
+    let era = z / 146_097;
+    let day_of_era = z % 146_097;
+    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month + 2) / 5 + 1;
+    let month = if month < 10 { month + 3 } else { month - 9 };
+    let year = year + era * 400 + u64::from(month <= 2);
+    let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
+    format!("{year:04}-{month:02}-{day:02}T{h:02}:{m:02}:{s:02}Z")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,6 +222,13 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let file = UndoFile::new(&folder.path().join("undo.jsonl"));
         (folder, file)
+    }
+
+    #[test]
+    fn times_are_dates() {
+        assert_eq!(utc(0), "1970-01-01T00:00:00Z");
+        assert_eq!(utc(951_827_696), "2000-02-29T12:34:56Z");
+        assert_eq!(utc(1_764_059_301), "2025-11-25T08:28:21Z");
     }
 
     #[test]
