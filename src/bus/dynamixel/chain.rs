@@ -18,7 +18,7 @@ const TRIES: u32 = 3;
 /// servo that is still booting is worth waiting for.
 const START_PATIENCE: Duration = Duration::from_millis(250);
 /// After an answer that did not come in time, the line is listened to until it was quiet this long.
-const QUIET: Duration = Duration::from_millis(10);
+pub(super) const QUIET: Duration = Duration::from_millis(10);
 
 /// Settings of a chain.
 #[derive(Clone, Debug, PartialEq)]

@@ -128,8 +128,10 @@ pub fn setup(args: &SetupArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
             say(
                 out,
                 format_args!(
-                    "\nall set up. Plug all of them in, then\n  handwave bus scan {bus}\n  \
-                     handwave bus calibrate --config {config} {bus}"
+                    "\ndone. With all of them plugged in, what comes next:\n  \
+                     handwave bus scan {bus}\n  \
+                     handwave bus calibrate --config {config} {bus}    (zero, direction, range by hand)\n  \
+                     handwave run {config} --bus {bus} --duration 10"
                 ),
             )?;
         }
