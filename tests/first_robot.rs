@@ -107,7 +107,7 @@ fn from_four_new_servos_to_an_arm_led_by_a_hand() {
     bench.run(&words(&monitor)).expect(0, &["joint1", "joint4"]);
 
     // The arm is led by a hand's recording. A busy machine may starve the simulator for a moment.
-    let run = [command("run"), vec!["--headless".into()]].concat();
+    let run = command("run");
     bench
         .run(&words(&run))
         .expect(0, &["read back from 4 of 4 servos"]);
