@@ -265,3 +265,29 @@ impl Drop for Asking {
         let _ = self.process.wait();
     }
 }
+
+/// Answers the questions of a calibration of `joint` whose servo is mounted with `sign` against the configuration's.
+#[track_caller]
+pub fn teach(bench: &mut Bench, asking: &mut Asking, id: u8, sign: i32, ends: (i32, i32)) {
+    let mut turn = |degrees: i32| bench.hand(&format!("turn {id} {}", sign * degrees));
+    asking.hear("skips this joint): ");
+    asking.answer("");
+    asking.hear("Then Enter: ");
+    turn(20);
+    asking.answer("");
+    if sign < 0 {
+        asking.hear("the configuration says +1. To be sure");
+        asking.hear("then Enter: ");
+        turn(-20);
+        asking.answer("");
+        asking.hear("Then Enter: ");
+        turn(20);
+        asking.answer("");
+    }
+    asking.hear("press Enter (k");
+    turn(ends.1 - 20);
+    turn(ends.0 - ends.1);
+    turn(-ends.0);
+    asking.answer("");
+    asking.hear("range is");
+}

@@ -22,7 +22,7 @@ const START_PATIENCE: Duration = Duration::from_millis(250);
 /// After an answer that did not come in time, the line is listened to until it was quiet this long.
 ///
 /// Longer than the latency timer of a USB adapter as it comes from the shop: its answers are then seen to be late.
-const QUIET: Duration = Duration::from_millis(20);
+pub(super) const QUIET: Duration = Duration::from_millis(20);
 /// Answers that come this late are worth a word: twice the latency timer that is wanted, and some.
 const WORTH_A_WORD: Duration = Duration::from_millis(4);
 

@@ -1,6 +1,6 @@
 //! What is looked at before a servo may move, and the way to torque.
 
-use super::chain::{DynamixelChain, Link, Servo};
+use super::chain::{DynamixelChain, Link, QUIET, Servo};
 use super::client::ClientError;
 use super::goals::resting_goal;
 use super::groups::FastReads;
@@ -175,7 +175,12 @@ impl DynamixelChain {
         match self.client.read(id, register, &mut level) {
             Ok(_) if level == [2] => return Ok(()),
             // At level 0 not even a read is answered, though the ping was.
-            Ok(_) | Err(ClientError::Timeout { .. }) => {}
+            Ok(_) => {}
+            Err(ClientError::Timeout { .. }) => {
+                // Or late: then it must not be taken for the answer to what is asked next.
+                let settled = self.client.settle(QUIET);
+                settled.map_err(|error| self.servo_error(index, error))?;
+            }
             Err(error) => return Err(self.servo_error(index, error)),
         }
         // A sync write never expects an answer.

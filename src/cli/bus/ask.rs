@@ -1,7 +1,9 @@
 //! Questions on the terminal, or answers down a pipe; Ctrl-C ends any wait.
 
 use super::say;
+use crate::base::Clock;
 use crate::cli::{ExitStatus, Failure};
+use crate::live::RealClock;
 use crate::live::StopSwitch;
 use crate::live::arrival::is_readable;
 use crate::live::stop::StopRequest;
@@ -64,7 +66,8 @@ impl Ask {
                 _ => self.ended = true,
             }
         } else if self.ended {
-            std::thread::sleep(wait);
+            let clock = RealClock::new();
+            clock.sleep_until(clock.now() + wait);
         }
         self.take_line()
     }

@@ -204,7 +204,7 @@ fn zero_place(character: &Character, joint: &str) -> String {
     match character.model.as_ref().zip(index) {
         Some((model, index)) => match model.far_end(index, &rest) {
             place if place.is_empty() => String::new(),
-            place => format!(" (with all joints at 0 {place})"),
+            place => format!("; with all joints at 0 {place}"),
         },
         None => String::new(),
     }
@@ -230,11 +230,11 @@ impl Hands {
         out: &mut dyn Write,
     ) -> Result<Option<ServoSpec>, Failure> {
         let mut spec = old.clone();
-        let (answer, hand) = self.moved(
-            out,
-            old,
-            &format!("  zero: move it to where its URDF has position 0{}. Then press Enter (s skips this joint): ", zero_place(character, &old.joint)),
-        )?;
+        let zero = format!(
+            "  zero: where its URDF has position 0{}.\n    Move it there and press Enter (s skips this joint): ",
+            zero_place(character, &old.joint)
+        );
+        let (answer, hand) = self.moved(out, old, &zero)?;
         if answer == "s" {
             return Ok(None);
         }
@@ -264,7 +264,7 @@ impl Hands {
             .unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
         loop {
             let text = format!(
-                "  range: move it to both ends of its range, {:.0} and {:.0} deg in the URDF, and press Enter (k keeps {}..{}): ",
+                "  range: move it to both ends of its range, {:.0} and {:.0} deg in the URDF.\n    Then press Enter (k keeps {}..{}): ",
                 limits.0.to_degrees(),
                 limits.1.to_degrees(),
                 old.min_pulse,
@@ -307,7 +307,7 @@ impl Hands {
     ) -> Result<Direction, Failure> {
         let way = way(character, &old.joint);
         let text = format!(
-            "  direction: move it from zero in its positive direction, 10 degrees or more: {way}. Then Enter: "
+            "  direction: move it 10 degrees or more in its positive direction: {way}.\n    Then Enter: "
         );
         let first = self.sense(out, old, &text)?;
         if first == old.direction {

@@ -13,12 +13,12 @@ use crate::bus::dynamixel::setup::{
 };
 use crate::bus::dynamixel::{Client, ClientError, Model};
 use crate::cli::{ExitStatus, Failure};
+use crate::live::clock::unix_now;
 use clap::Args;
 use handwave_dynamixel::baud::RATES;
 use posts::{Post, parse_limits, parse_rates, posts};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Give new servos their id, baud rate and settings, one at a time; undo it.
 ///
@@ -128,8 +128,10 @@ pub fn setup(args: &SetupArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
             say(
                 out,
                 format_args!(
-                    "\nall set up. Plug all of them in, then\n  handwave bus scan {bus}\n  \
-                     handwave bus calibrate --config {config} {bus}"
+                    "\ndone. With all of them plugged in, what comes next:\n  \
+                     handwave bus scan {bus}\n  \
+                     handwave bus calibrate --config {config} {bus}    (zero, direction, range by hand)\n  \
+                     handwave run {config} --bus {bus} --duration 10"
                 ),
             )?;
         }
@@ -423,6 +425,5 @@ fn failure(error: SetupError) -> Failure {
 
 /// The time now as `2026-11-25T08:15:02Z`.
 fn utc_now() -> String {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    undo::utc(now.map_or(0, |since| since.as_secs()))
+    undo::utc(unix_now().as_secs())
 }

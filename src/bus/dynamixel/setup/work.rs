@@ -126,6 +126,7 @@ fn write(
         if outcome.is_ok() {
             break;
         }
+        client.settle(SETTLE)?;
     }
     outcome?;
     client.settle(SETTLE)?;
@@ -151,6 +152,7 @@ fn read(client: &mut dyn Client, id: u8, register: &Register) -> Result<i64, Cli
             Err(ClientError::Timeout { .. }) if tries < TRIES => tries += 1,
             Err(error) => return Err(error),
         }
+        client.settle(SETTLE)?;
     }
 }
 
