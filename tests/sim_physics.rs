@@ -3,7 +3,7 @@
 #[path = "support/sim_host.rs"]
 mod sim_host;
 
-use handwave::base::Clock;
+use handwave::base::{Clock, Time};
 use handwave::bus::{Port, PortError};
 use handwave::sim::{LineOptions, SimPort};
 use handwave_dynamixel::instruction::Instruction;
@@ -151,12 +151,13 @@ fn a_sagging_supply_weakens_and_below_the_limit_it_is_an_error() {
 fn an_encoder_that_jumps_drives_the_shaft_and_a_frozen_one_does_not_tell() {
     let mut host = Host::new(1).fault("1:encoder-jump=200@0.5s..1.5s");
     host.write(1, 64, &[1]);
-    host.wait(0.48);
+    host.wait(0.4);
     assert_eq!(host.read_i32(1, 132), 2048);
     // The jump itself, before the motor has answered it.
-    host.clock
-        .sleep_until(handwave::base::Time::from_secs(0.6005));
-    host.wait(1.0);
+    host.clock.sleep_until(Time::from_secs(0.501));
+    let jumped = host.read_i32(1, 132);
+    assert!((2200..=2248).contains(&jumped), "jumped to {jumped}");
+    host.wait(0.5);
     let settled = host.read_i32(1, 132);
     assert!((2040..=2056).contains(&settled), "driven back to {settled}");
     host.wait(0.5);
