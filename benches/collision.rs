@@ -46,6 +46,7 @@ fn collision(criterion: &mut Criterion) {
         upper: 0.7,
         velocity: 4.77,
         acceleration: 80.0,
+        jerk: f64::INFINITY,
     };
     let mut envelope = Envelope::new(vec![limit; JOINTS], 0.005);
     let mut guard = CollisionGuard::new(model.clone());

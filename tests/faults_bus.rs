@@ -32,7 +32,8 @@ fn is_borne(fault: &str, at_most_s: f64) {
 fn damage_now_and_then_costs_single_cycles() {
     is_borne("corrupt=0.02", 3.0 * CYCLE_S);
     is_borne("truncated=0.02", 3.0 * CYCLE_S);
-    is_borne("lost-bytes=0.001", 3.0 * CYCLE_S);
+    // Every fourth cycle is hit, and now and then the second try of a servo with it.
+    is_borne("lost-bytes=0.001", 5.0 * CYCLE_S);
 }
 
 #[test]

@@ -96,6 +96,7 @@ impl Envelope {
     /// Takes on the state of `other`, an envelope of as many joints, without allocating.
     pub fn copy_from(&mut self, other: &Self) {
         self.joints.copy_from_slice(&other.joints);
+        self.pace = other.pace;
     }
 
     /// Passes one step of targets into `out`. Returns how many joints had to be held back.
