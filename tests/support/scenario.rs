@@ -217,9 +217,21 @@ impl Played {
 
     /// Distance of the last target from lying, rad.
     fn lying(&self) -> f64 {
-        let end = built_in().end_pose.expect("an end pose");
+        let character = built_in();
+        let end = character.end_pose.expect("an end pose");
         let last = self.targets.rows.last().expect("rows");
-        let ways = last.iter().zip(&end).map(|(a, b)| (a - b).abs());
+        // A servo whose fault lasts is left where it was found: it is not driven.
+        let left_out = |joint: &str| {
+            let faults = self.summary["faults"].as_array();
+            faults.is_some_and(|all| {
+                all.iter()
+                    .any(|f| f["joint"] == joint && f["to_s"].is_null())
+            })
+        };
+        let joints = last.iter().zip(&end).zip(&character.joints);
+        let ways = joints
+            .filter(|(_, joint)| !left_out(joint))
+            .map(|((a, b), _)| (a - b).abs());
         ways.fold(0.0, f64::max)
     }
 

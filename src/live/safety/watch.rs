@@ -82,6 +82,11 @@ impl Stuck {
             }
         }
     }
+
+    /// How far its target has gone to and fro without it, rad.
+    fn missed_rad(&self) -> f64 {
+        self.at.map_or(0.0, |(_, low, high)| high - low)
+    }
 }
 
 /// Motion that is left while a quantity rises from `begins` to `ends`: 1 below, `least` above.
@@ -262,13 +267,20 @@ impl Watch {
         // What pushes and stands is called by its name, though it is away from its target too.
         let pushing = watched && (self.stalled_s > 0.0 || self.stuck.for_s > 0.0 && blocked);
         let off = settings.following_error_rad > 0.0 && self.over_s >= settings.following_error_s;
+        let lost_grip = stuck && !off;
         let off = (off || stuck) && !pushing;
+        // One that has not moved is told by how far its target went without it.
+        let (value, limit) = if lost_grip {
+            (self.stuck.missed_rad(), SWEPT_RAD)
+        } else {
+            (error, settings.following_error_rad)
+        };
         (
             Finding {
                 kind: FaultKind::FollowingError,
                 active: off,
-                value: error,
-                limit: settings.following_error_rad,
+                value,
+                limit,
             },
             Finding {
                 kind: FaultKind::Stall,
