@@ -110,7 +110,7 @@ fn a_servo_that_warms_up_walks_smaller_before_the_run_ends() {
 fn a_weak_supply_makes_the_walk_smaller_and_a_good_one_large_again() {
     let ran = Rig::new(34.0, &[])
         .ill(|t_s, _, health| {
-            let volts = if (8.0..12.0).contains(&t_s) {
+            let volts = if (15.0..20.0).contains(&t_s) {
                 6.1
             } else {
                 11.1

@@ -160,9 +160,10 @@ fn an_encoder_that_jumps_drives_the_shaft_and_a_frozen_one_does_not_tell() {
     host.wait(0.5);
     let settled = host.read_i32(1, 132);
     assert!((2040..=2056).contains(&settled), "driven back to {settled}");
-    host.wait(0.5);
+    // The motor has to turn the whole jump back, and rests where friction holds it.
+    host.wait(1.0);
     assert!(
-        (host.pulses(1) - 2048.0).abs() < 5.0,
+        (host.pulses(1) - 2048.0).abs() < 10.0,
         "after it {}",
         host.pulses(1)
     );
