@@ -251,16 +251,8 @@ impl Hands {
         }
         let limits = character.joints.iter().position(|name| *name == old.joint);
         let limits = limits
-            .and_then(|index| {
-                Some(
-                    character
-                        .model
-                        .as_ref()?
-                        .limits()
-                        .get(index)
-                        .map(|l| (l.lower, l.upper))?,
-                )
-            })
+            .and_then(|index| character.model.as_ref()?.limits().get(index).copied())
+            .map(|limit| (limit.lower, limit.upper))
             .unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
         loop {
             let text = format!(

@@ -52,7 +52,7 @@ impl Supervisor {
         None
     }
 
-    /// The bus did what [`Verdict::request`] asked; or it could not.
+    /// The bus did what [`Verdict::request`](super::Verdict::request) asked; or it could not.
     pub fn answered(&mut self, request: Request, done: bool) {
         self.changes.clear();
         match (request, done) {

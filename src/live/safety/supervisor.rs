@@ -203,9 +203,9 @@ impl Supervisor {
             return 1.0;
         };
         let joint = &mut self.joints[index];
-        let follows = !(silent || torqueless || alert || joint.left_out)
-            && !mask(seen.report.ramping_mask)
-            && joint.faults & out_of_motion() == 0;
+        let away = silent || torqueless || alert || joint.left_out;
+        let ramping = mask(seen.report.ramping_mask);
+        let follows = !(away || ramping) && joint.faults & out_of_motion() == 0;
         let look = joint.watch.look(
             &self.policy.supervision,
             *target,

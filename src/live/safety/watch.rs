@@ -242,8 +242,8 @@ impl Watch {
         let effort = state.effort.abs() / self.full_effort;
         if fresh && follows {
             self.seen_at = state.measured_at;
-            let step = |sum: f64, so: bool| (sum + if so { dt_s } else { -dt_s }).max(0.0);
-            self.over_s = step(self.over_s, error > settings.following_error_rad);
+            let is_off = error > settings.following_error_rad;
+            self.over_s = (self.over_s + if is_off { dt_s } else { -dt_s }).max(0.0);
             // A target that goes to and fro pulls at a blocked joint now and then only: what counts is that it
             // has not moved since.
             let stands = state.velocity.abs() < STANDING_RAD_S;

@@ -158,7 +158,7 @@ fn a_million_random_steps_stay_inside() {
                 5 if f64::is_finite(target) => target + 0.01 * chance.normal(),
                 _ => 0.8 * (k as f64 * 0.07).sin(),
             };
-            if chance.bits() % 512 == 0 {
+            if chance.bits().is_multiple_of(512) {
                 envelope.set_pace(chance.unit());
             }
             envelope.pass(&[target], &mut out);
