@@ -1,4 +1,4 @@
-//! Dynamixel Protocol 2.0 on bytes alone: frames, instructions, statuses, for host and device.
+//! Dynamixel Protocols 2.0 and 1.0 on bytes alone: frames, instructions, statuses, for host and device.
 //!
 //! Nothing here does I/O, reads a clock or allocates; buffers belong to the caller. The two levels:
 //!
@@ -7,9 +7,11 @@
 //! * typed: [`Instruction`] and [`Status`] hold only what has a meaning, for both ends of the line,
 //!   [`fast`] the combined reply of fast sync and fast bulk reads.
 //!
+//! Protocol 1.0 of the AX class has its own [`p1`], in the same two levels.
+//!
 //! [`wire`] computes how long all this takes on the line, [`baud`] maps the baud rate register.
 //!
-//! Facts are those of the vendor's e-manual, "DYNAMIXEL Protocol 2.0".
+//! Facts are those of the vendor's e-manual, "DYNAMIXEL Protocol 2.0" and "1.0".
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -19,9 +21,11 @@ extern crate std;
 pub mod baud;
 pub mod crc;
 pub mod fast;
+mod finder;
 pub mod frame;
 pub mod instruction;
 pub mod lists;
+pub mod p1;
 pub mod parser;
 pub mod status;
 pub mod stuffing;

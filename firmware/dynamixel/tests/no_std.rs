@@ -9,8 +9,19 @@ fn only_tests_see_the_standard_library() {
     let lib = fs::read_to_string(source.join("lib.rs")).expect("the crate's root");
     assert!(lib.lines().any(|line| line == "#![no_std]"));
     // Without an `extern crate` nothing of them can be named, so the crate's root decides.
-    for entry in fs::read_dir(&source).expect("the crate's sources") {
-        let path = entry.expect("an entry").path();
+    let mut folders = vec![source];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("the crate's sources") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.push(path);
+            }
+        }
+    }
+    for path in files {
         let text = fs::read_to_string(&path).expect("a source file");
         let lines: Vec<&str> = text.lines().map(str::trim).collect();
         for (number, line) in lines.iter().enumerate() {
