@@ -10,7 +10,9 @@ use handwave::base::JointState;
 use handwave::bus::ServoBus;
 use handwave::bus::address::DynamixelBackend;
 use handwave::bus::dynamixel::model::{STATE_BYTES, XL430_W250, address};
-use handwave::bus::dynamixel::{self, ChainOptions, Client, DynamixelChain, Outcome, ServoSpec};
+use handwave::bus::dynamixel::{
+    self, ChainOptions, Client, DynamixelChain, Outcome, ServoSpec, Speaks,
+};
 use handwave::bus::port::bare;
 use handwave::live::RealClock;
 use handwave::live::clock::thread_cpu_time;
@@ -68,7 +70,15 @@ impl Servos {
     fn client(&self) -> Box<dyn Client> {
         let clock = Arc::new(RealClock::new());
         let backend = DynamixelBackend::Handwave;
-        dynamixel::open(self.path(), BAUD, backend, clock, &mut bare).expect("the servos' port")
+        dynamixel::open(
+            self.path(),
+            BAUD,
+            backend,
+            Speaks::default(),
+            clock,
+            &mut bare,
+        )
+        .expect("the servos' port")
     }
 
     /// A chain with torque on.

@@ -6,7 +6,7 @@
 
 use handwave::base::{Clock, JointState};
 use handwave::bus::dynamixel::model::Model;
-use handwave::bus::dynamixel::{self, ChainOptions, DynamixelChain, ServoSpec};
+use handwave::bus::dynamixel::{self, ChainOptions, DynamixelChain, ServoSpec, Speaks};
 use handwave::bus::port::bare;
 use handwave::bus::{BusAddress, ServoBus};
 use handwave::live::RealClock;
@@ -30,7 +30,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("expected a bus such as dynamixel:/dev/ttyUSB0@1000000".into());
     };
     let clock = Arc::new(RealClock::new());
-    let client = dynamixel::open(&path, baud, backend, clock.clone(), &mut bare)?;
+    let client = dynamixel::open(
+        &path,
+        baud,
+        backend,
+        Speaks::default(),
+        clock.clone(),
+        &mut bare,
+    )?;
     let model = Model::by_name("xl430-w250").ok_or("a model this library does not know")?;
     let servos: u8 = servos.parse()?;
     let specs = (1..=servos).map(|id| ServoSpec::new(id, format!("joint{id}"), model));

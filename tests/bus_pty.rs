@@ -3,7 +3,7 @@
 use handwave::base::{Clock, JointState};
 use handwave::bus::address::DynamixelBackend;
 use handwave::bus::dynamixel::model::Model;
-use handwave::bus::dynamixel::{self, ChainOptions, DynamixelChain, ServoSpec};
+use handwave::bus::dynamixel::{self, ChainOptions, DynamixelChain, ServoSpec, Speaks};
 use handwave::bus::port::bare;
 use handwave::bus::{BusError, ServoBus};
 use handwave::live::RealClock;
@@ -64,6 +64,7 @@ impl Simulator {
             self.path(),
             1_000_000,
             backend,
+            Speaks::default(),
             Arc::new(clock.clone()),
             &mut bare,
         )

@@ -3,7 +3,7 @@
 use handwave::base::{Clock, JointState};
 use handwave::bus::address::DynamixelBackend;
 use handwave::bus::dynamixel::model::Model;
-use handwave::bus::dynamixel::{self, ChainOptions, DynamixelChain, ServoSpec};
+use handwave::bus::dynamixel::{self, ChainOptions, DynamixelChain, ServoSpec, Speaks};
 use handwave::bus::port::bare;
 use handwave::bus::{BusError, ServoBus};
 use handwave::live::RealClock;
@@ -73,7 +73,14 @@ impl Bench {
         let plug = Plug::in_at(&line, &clock, &link);
         let path = link.to_str().expect("a path in UTF-8");
         let backend = DynamixelBackend::Handwave;
-        let client = dynamixel::open(path, 1_000_000, backend, Arc::clone(&clock), &mut bare);
+        let client = dynamixel::open(
+            path,
+            1_000_000,
+            backend,
+            Speaks::default(),
+            Arc::clone(&clock),
+            &mut bare,
+        );
         let model = Model::by_name("xl430-w250").expect("a known model");
         let specs = (1..=3).map(|id| ServoSpec::new(id, format!("joint{id}"), model));
         let options = ChainOptions {

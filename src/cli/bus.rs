@@ -19,7 +19,7 @@ mod setup;
 
 use super::{ExitStatus, Failure};
 use crate::base::Clock;
-use crate::bus::dynamixel::{self, Backup, Client, ClientError, Model};
+use crate::bus::dynamixel::{self, Backup, Client, ClientError, Model, Speaks};
 use crate::bus::port::bare;
 use crate::bus::{AddressError, BusAddress};
 use crate::live::RealClock;
@@ -135,7 +135,8 @@ fn open_on(bus: &BusAddress, clock: Arc<dyn Clock>) -> Result<Box<dyn Client>, F
             path,
             baud,
             backend,
-        } => dynamixel::open(path, *baud, *backend, clock, &mut bare).map_err(Failure::bus),
+        } => dynamixel::open(path, *baud, *backend, Speaks::Either, clock, &mut bare)
+            .map_err(Failure::bus),
     }
 }
 

@@ -4,7 +4,8 @@ use super::realtime;
 use crate::base::{Clock, Time};
 use crate::bus::dynamixel::model::STATE_BYTES;
 use crate::bus::dynamixel::{
-    self, ChainOptions, Client, DynamixelChain, Master, MasterOptions, ServoSpec, SpecError,
+    self, ChainOptions, Client, DynamixelChain, Master, MasterOptions, Protocol, ServoSpec, Speaks,
+    SpecError, protocol_of,
 };
 use crate::bus::parallel::{BusPart, ParallelError};
 use crate::bus::port::WrapPort;
@@ -12,12 +13,15 @@ use crate::bus::{BusAddress, BusLine, Buses, NoServos, ParallelBus, PortError, S
 use crate::config::Character;
 use crate::sim::{self, FaultSpec, Line, LineOptions, Servo, SharedLine, SimPort};
 use handwave_dynamixel::baud::{self, RateList};
-use handwave_dynamixel::wire;
+use handwave_dynamixel::{p1, wire};
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
 /// Bytes of a goal position.
 const GOAL_BYTES: usize = 4;
+/// Bytes of a goal position, and of position, speed and load, in Protocol 1.0.
+const ONE_GOAL_BYTES: usize = 2;
+const ONE_STATE_BYTES: usize = 6;
 
 /// An open bus, and the simulated lines behind it if there are any.
 pub struct Wire {
@@ -107,6 +111,8 @@ pub fn open(
             cycle_budget: Duration::from_secs_f64(1.0 / rate_hz),
             ..ChainOptions::default()
         };
+        let protocol = protocol_of(&chain.servos)?;
+        let speaks = Speaks::Only(protocol);
         let client: Box<dyn Client> = match &chain.line.address {
             BusAddress::Sim => {
                 let baud = chain.line.sim_baud;
@@ -114,13 +120,13 @@ pub fn open(
                 lines.push(line.clone());
                 let port = wrap(&options.bus, Box::new(SimPort::new(line, own, baud)));
                 let options = MasterOptions::of(port.as_ref());
-                Box::new(Master::new(port, options))
+                Box::new(Master::new(port, options).speaking(speaks))
             }
             BusAddress::Dynamixel {
                 path,
                 baud,
                 backend,
-            } => dynamixel::open(path, *baud, *backend, own, wrap)?,
+            } => dynamixel::open(path, *baud, *backend, speaks, own, wrap)?,
         };
         parts.push(BusPart {
             name: chain.line.name.clone(),
@@ -196,7 +202,8 @@ fn simulated_line(servos: &[ServoSpec], rate: u32) -> Result<SharedLine, WireErr
 
 /// Says so when a wire cannot carry `rate_hz` cycles per second: `None` when all can.
 ///
-/// The least a cycle takes is a sync write of goals and a fast sync read of states, byte times alone.
+/// The least a cycle takes is a sync write of goals and a fast sync read of states, byte times alone; in Protocol 1.0 a
+/// read of each servo.
 pub fn too_slow(character: &Character, buses: &Buses, rate_hz: f64) -> Option<String> {
     let chains = chains(character, buses);
     let several = chains.len() > 1;
@@ -206,7 +213,13 @@ pub fn too_slow(character: &Character, buses: &Buses, rate_hz: f64) -> Option<St
             BusAddress::Dynamixel { baud, .. } => *baud,
         };
         let servos = chain.servos.len();
-        let cycle = wire::duration(wire::fast_cycle(servos, GOAL_BYTES, STATE_BYTES), baud);
+        let one = chain.servos.iter().any(|servo| servo.model.protocol == Protocol::One);
+        let bytes = if one {
+            p1::wire::read_cycle(servos, ONE_GOAL_BYTES, ONE_STATE_BYTES)
+        } else {
+            wire::fast_cycle(servos, GOAL_BYTES, STATE_BYTES)
+        };
+        let cycle = wire::duration(bytes, baud);
         let period_s = 1.0 / rate_hz;
         let on = if several {
             format!(" on bus {}", chain.line.name)

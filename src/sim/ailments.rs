@@ -5,11 +5,6 @@ use super::servo::Servo;
 use crate::base::Time;
 use crate::bus::dynamixel::model::{POSITION_MODE, address, hardware_error};
 
-/// Registers of limits, X series.
-const TEMPERATURE_LIMIT: u16 = 31;
-const MAX_VOLTAGE_LIMIT: u16 = 32;
-const MIN_VOLTAGE_LIMIT: u16 = 34;
-
 /// What injected faults do to a servo at present.
 #[derive(Copy, Clone, Debug, Default, PartialEq)]
 pub struct Ailments {
@@ -118,12 +113,15 @@ impl Servo {
         if overload && self.setpoint.torque_on {
             bits |= hardware_error::OVERLOAD;
         }
-        let hottest_c = limit(TEMPERATURE_LIMIT);
+        let hottest_c = limit(address::TEMPERATURE_LIMIT);
         if hottest_c > 0.0 && self.thermal.sensor_c() > hottest_c {
             bits |= hardware_error::OVERHEATING;
         }
         let volts = 10.0 * (self.thermal.supply_v() - self.ailments.sag_v).max(0.0);
-        let (least, most) = (limit(MIN_VOLTAGE_LIMIT), limit(MAX_VOLTAGE_LIMIT));
+        let (least, most) = (
+            limit(address::MIN_VOLTAGE_LIMIT),
+            limit(address::MAX_VOLTAGE_LIMIT),
+        );
         if most > 0.0 && !(least..=most).contains(&volts) {
             bits |= hardware_error::VOLTAGE;
         }

@@ -1,7 +1,9 @@
 //! The control table of one servo: bytes, access rules, ranges, indirect slots.
 
 use super::motor::MotorSpec;
-use crate::bus::dynamixel::model::{Access, IndirectBlock, Model, RAM_BEGIN, Register, address};
+use crate::bus::dynamixel::model::{
+    Access, IndirectBlock, Model, RAM_BEGIN, Register, Sign, address,
+};
 use handwave_dynamixel::ErrorCode;
 use std::ops::Range;
 
@@ -127,6 +129,7 @@ impl Device {
                         min: i64::from(self.model.layout.ram_begin),
                         max: i64::from(end - 1),
                         unit: "",
+                        sign: Sign::TwosComplement,
                     },
                     initial: i64::from(block.data + slot),
                 });
@@ -139,6 +142,7 @@ impl Device {
                         min: 0,
                         max: 255,
                         unit: "",
+                        sign: Sign::TwosComplement,
                     },
                     initial: 0,
                 });

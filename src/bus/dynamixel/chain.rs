@@ -9,7 +9,7 @@ use super::follow::Follower;
 use super::groups::{ReadGroup, goal_registers, read_groups};
 use super::health::Watch;
 use super::model::{STATE_BYTES, address};
-use super::servo::{ServoSpec, SpecError};
+use super::servo::{ServoSpec, SpecError, protocol_of};
 use crate::base::{JointState, Time};
 use crate::bus::{BusError, CycleReport, ServoBus, ServoFacts, ServoHealth, TorqueReport};
 use std::time::Duration;
@@ -157,6 +157,7 @@ impl DynamixelChain {
                 });
             }
         }
+        protocol_of(&specs)?;
         let count = specs.len();
         let now = client.now();
         let goal_registers = goal_registers(&specs);

@@ -4,7 +4,7 @@ use super::chain::{DynamixelChain, Link, QUIET, Servo};
 use super::client::ClientError;
 use super::goals::resting_goal;
 use super::groups::FastReads;
-use super::model::{Mode, Model, STATE_BYTES, address, hardware_error};
+use super::model::{Mode, Model, Protocol, STATE_BYTES, address, hardware_error};
 use super::servo::position_pulse;
 use crate::base::JointState;
 use crate::bus::BusError;
@@ -74,6 +74,10 @@ impl DynamixelChain {
             reads.fast = FastReads::new(old.is_none());
             let Some(old) = old else { continue };
             let (id, model) = (old.spec.id, old.spec.model);
+            if model.protocol == Protocol::One {
+                // Nobody expects them of it.
+                continue;
+            }
             self.notes.push(if model.fast_reads_since == u8::MAX {
                 format!(
                     "servo {id} is an {}, which knows no fast reads: ordinary sync reads are used",
@@ -123,9 +127,16 @@ impl DynamixelChain {
                     Mode::from_number(mode).map_or(String::new(), |mode| format!(" ({})", mode.name())),
                     spec.mode.name()
                 ),
-                format!(
-                    "With torque off set it by `handwave bus write {bus} {id} operating_mode {wanted}`"
-                ),
+                match spec.model.protocol {
+                    Protocol::Two => format!(
+                        "With torque off set it by `handwave bus write {bus} {id} operating_mode {wanted}`"
+                    ),
+                    Protocol::One => format!(
+                        "Its angle limits say so. With torque off set them by `handwave bus write {bus} {id} \
+                         cw_angle_limit {}`, `handwave bus write {bus} {id} ccw_angle_limit {}`",
+                        spec.min_pulse, spec.max_pulse
+                    ),
+                },
             ));
         }
         if drive_mode & DRIVE_MODE_FOREIGN != 0 {
@@ -209,6 +220,10 @@ impl DynamixelChain {
             return Ok(());
         }
         let (id, bus) = (spec.id, &self.options.bus);
+        let name = |x_series| {
+            let register = spec.model.register_like(x_series);
+            register.map_or("", |register| register.name)
+        };
         Err(self.servo_problem(
             index,
             format!(
@@ -218,9 +233,11 @@ impl DynamixelChain {
             ),
             format!(
                 "Narrow the configured range, or with torque off widen the limits: \
-                 `handwave bus write {bus} {id} min_position_limit {}`, \
-                 `handwave bus write {bus} {id} max_position_limit {}`",
-                spec.min_pulse, spec.max_pulse
+                 `handwave bus write {bus} {id} {} {}`, `handwave bus write {bus} {id} {} {}`",
+                name(address::MIN_POSITION_LIMIT),
+                spec.min_pulse,
+                name(address::MAX_POSITION_LIMIT),
+                spec.max_pulse
             ),
         ))
     }
@@ -259,6 +276,18 @@ impl DynamixelChain {
         ))
     }
 
+    /// What to do first, and how to restart servo `index` then.
+    fn restart_advice(&self, index: usize, first: &str) -> String {
+        let spec = &self.servos[index].spec;
+        match spec.model.protocol {
+            Protocol::Two => format!(
+                "{first}, then `handwave bus reboot {} {}`",
+                self.options.bus, spec.id
+            ),
+            Protocol::One => format!("{first}, then switch its power off and on"),
+        }
+    }
+
     /// Says which hardware errors are latched and how to get rid of them.
     pub(super) fn hardware_error(&self, index: usize, errors: u8) -> BusError {
         let names: Vec<&str> = hardware_error::NAMES
@@ -266,6 +295,7 @@ impl DynamixelChain {
             .filter(|(bit, _)| errors & bit != 0)
             .map(|(_, name)| *name)
             .collect();
+        let protocol = self.servos[index].spec.model.protocol;
         let what = if names.is_empty() {
             "unknown".into()
         } else {
@@ -273,11 +303,13 @@ impl DynamixelChain {
         };
         self.servo_problem(
             index,
-            format!("hardware error latched: {what} (register 70 = {errors:#04x})"),
-            format!(
-                "Remove the cause, then `handwave bus reboot {} {}`",
-                self.options.bus, self.servos[index].spec.id
-            ),
+            match protocol {
+                Protocol::Two => {
+                    format!("hardware error latched: {what} (register 70 = {errors:#04x})")
+                }
+                Protocol::One => format!("it reports {what} (error bits {errors:#04x})"),
+            },
+            self.restart_advice(index, "Remove the cause"),
         )
     }
 
@@ -302,10 +334,7 @@ impl DynamixelChain {
             return Err(self.servo_problem(
                 index,
                 format!("torque does not come on (torque_enable reads {torque})"),
-                format!(
-                    "Check its supply, then `handwave bus reboot {} {}`",
-                    self.options.bus, self.servos[index].spec.id
-                ),
+                self.restart_advice(index, "Check its supply"),
             ));
         }
         let servo = &mut self.servos[index];

@@ -88,6 +88,14 @@ pub enum ClientError {
         /// The servo.
         id: u8,
     },
+    /// Protocol 1.0 has no such thing.
+    #[error("servo {id} speaks Protocol 1.0, in which one cannot {what}")]
+    NotInProtocolOne {
+        /// Who was asked.
+        id: u8,
+        /// What was asked, and what to do instead.
+        what: &'static str,
+    },
     /// This driver cannot do it.
     #[error("the {backend} backend cannot {what}")]
     Unsupported {
@@ -132,7 +140,7 @@ pub struct Traffic {
     pub damaged: u64,
 }
 
-/// Somebody who speaks Protocol 2.0 to the servos of one line.
+/// Somebody who speaks to the servos of one line, by Protocol 2.0 or 1.0.
 ///
 /// Reads of several servos take one buffer for all data, `length` bytes per id in the order of
 /// `ids`, and one [`Outcome`] per id; data of a servo that is not fresh is left as it was.

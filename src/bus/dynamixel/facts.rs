@@ -1,7 +1,7 @@
 //! What a servo itself bears and does, read before it may move: limits, watchdog.
 
 use super::chain::DynamixelChain;
-use super::model::{Effort, Mode, WATCHDOG_UNIT_MS, address};
+use super::model::{Effort, Mode, Protocol, WATCHDOG_UNIT_MS, address};
 use crate::bus::{BusError, ServoFacts};
 
 /// Registers 31 to 37: temperature limit, voltage limits, PWM limit.
@@ -19,7 +19,7 @@ impl DynamixelChain {
         let model = spec.model;
         let effort_limit = match model.effort {
             Effort::Load => {
-                let whole = model.register_at(address::PWM_LIMIT).map_or(1, |r| r.max);
+                let whole = model.register_like(address::PWM_LIMIT).map_or(1, |r| r.max);
                 f64::from(u16::from_le_bytes([pwm0, pwm1])) / whole.max(1) as f64
             }
             Effort::Current => {
@@ -86,10 +86,13 @@ impl DynamixelChain {
         }
         if firmware < spec.model.watchdog_since {
             self.servos[index].watchdog = 0;
-            self.notes.push(unprotected(format!(
-                "firmware {firmware} has none, it needs {}",
-                spec.model.watchdog_since
-            )));
+            self.notes.push(unprotected(match spec.model.protocol {
+                Protocol::One => "servos with Protocol 1.0 have none".into(),
+                Protocol::Two => format!(
+                    "firmware {firmware} has none, it needs {}",
+                    spec.model.watchdog_since
+                ),
+            }));
             return Ok(None);
         }
         if !spec.mode.has_position_limits() && spec.mode.holds_position() {

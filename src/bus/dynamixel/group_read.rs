@@ -117,7 +117,7 @@ impl Master {
             let again = asked.request(behind) + behind * wire::status(0) + asked.rest(turn + 1);
             let deadline = self.deadline(due, again);
             let mut heard = turn;
-            let bad_crc = self.parser.damage().bad_crc;
+            let bad_crc = self.listener.damage().bad_crc;
             let mut accept = |status: &Status<'_>| {
                 let index = asked.position(status.id);
                 let Some(index) = index.filter(|&index| outcomes[index] == Outcome::NotReached)
@@ -149,7 +149,7 @@ impl Master {
             if !answered && whole < deadline {
                 answered = self.receive(1, deadline, &mut accept)?;
             }
-            let missing = if self.parser.damage().bad_crc > bad_crc {
+            let missing = if self.listener.damage().bad_crc > bad_crc {
                 Outcome::Damaged
             } else {
                 Outcome::Silent

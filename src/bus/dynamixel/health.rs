@@ -8,7 +8,7 @@
 use super::chain::DynamixelChain;
 use super::client::ClientError;
 use super::cycle::bit;
-use super::model::{Model, Register};
+use super::model::{Model, Protocol, Register, address};
 use crate::base::Time;
 use crate::bus::{BusError, ServoHealth};
 use handwave_dynamixel::wire;
@@ -34,7 +34,8 @@ struct Vitals {
     length: usize,
     voltage: Option<&'static Register>,
     temperature: Option<&'static Register>,
-    error: Option<&'static Register>,
+    /// Address of the hardware error.
+    error: Option<u16>,
 }
 
 impl Vitals {
@@ -55,7 +56,11 @@ impl Vitals {
             length: if near { end - begin } else { 0 },
             voltage: voltage.filter(|_| near),
             temperature: temperature.filter(|_| near),
-            error: named(["hardware_error_status", "hardware_error"]),
+            error: match model.protocol {
+                Protocol::Two => named(["hardware_error_status", "hardware_error"])
+                    .map(|register| register.address),
+                Protocol::One => Some(model.layout.at(address::HARDWARE_ERROR_STATUS)),
+            },
         }
     }
 
@@ -178,9 +183,9 @@ impl DynamixelChain {
         alert: bool,
     ) -> Result<(), BusError> {
         let vitals = self.watch.vitals[index];
-        let (address, length) = match (turn, vitals.error) {
+        let (begin, length) = match (turn, vitals.error) {
             (Turn::Vitals, _) => (vitals.address, vitals.length),
-            (Turn::Error, Some(error)) => (error.address, 1),
+            (Turn::Error, Some(error)) => (error, 1),
             (Turn::Error, None) => return Ok(()),
         };
         let mut bytes = [0; SPAN_BYTES];
@@ -188,7 +193,7 @@ impl DynamixelChain {
             return Ok(());
         };
         let id = self.servos[index].spec.id;
-        match self.client.read_by(id, address, bytes, latest) {
+        match self.client.read_by(id, begin, bytes, latest) {
             Ok(_) => {}
             Err(ClientError::Port(error)) => return Err(error.into()),
             Err(_) => return Ok(()),

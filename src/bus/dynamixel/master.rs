@@ -6,16 +6,14 @@
 //! a silent servo or too short for a USB adapter.
 
 use super::allowance::Allowance;
-use super::client::{ClientError, Reply};
+use super::client::{ClientError, Ping, Reply};
+use super::listener::{FRAME_BYTES, Listener};
+use super::model::Protocol;
 use crate::base::Time;
 use crate::bus::port::Port;
-use handwave_dynamixel::{
-    BROADCAST_ID, BufferTooSmall, ErrorCode, FrameParser, Instruction, Status, wire,
-};
+use handwave_dynamixel::{BROADCAST_ID, BufferTooSmall, ErrorCode, Instruction, Status, wire};
 use std::time::Duration;
 
-/// Longest frame received one by one, and longest frame sent.
-const FRAME_BYTES: usize = 2048;
 /// Longest combined status: 253 servos with 12 bytes each.
 pub(super) const FAST_BYTES: usize = 4096;
 
@@ -58,7 +56,22 @@ impl MasterOptions {
 /// Left of a control cycle after the servos behind a silent one were asked again.
 const SPARE_MARGIN: Duration = Duration::from_micros(300);
 
-/// Speaks Protocol 2.0 over a [`Port`].
+/// Which protocols a [`Master`] speaks.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+pub enum Speaks {
+    /// To all servos the same.
+    Only(Protocol),
+    /// To each servo the one that it answers to: an unknown one is asked in Protocol 2.0 first, then in 1.0.
+    Either,
+}
+
+impl Default for Speaks {
+    fn default() -> Self {
+        Speaks::Only(Protocol::Two)
+    }
+}
+
+/// Speaks Protocol 2.0, and where it is told to 1.0, over a [`Port`].
 pub struct Master {
     pub(super) port: Box<dyn Port>,
     pub(super) return_delay: Duration,
@@ -72,7 +85,12 @@ pub struct Master {
     pub(super) may_hold_stale: bool,
     pub(super) notes: Vec<String>,
     pub(super) cycle_end: Option<Time>,
-    pub(super) parser: FrameParser<FRAME_BYTES>,
+    pub(super) listener: Listener,
+    pub(super) speaks: Speaks,
+    /// What each servo is known to speak.
+    known: Box<[Option<Protocol>; 256]>,
+    /// Something damaged came in while the latest answer was waited for.
+    pub(super) heard_damage: bool,
     /// Bytes of a combined status.
     pub(super) combined: Box<[u8; FAST_BYTES]>,
     out: Box<[u8; FRAME_BYTES]>,
@@ -98,7 +116,10 @@ impl Master {
             may_hold_stale: true,
             notes: Vec::new(),
             cycle_end: None,
-            parser: FrameParser::new(),
+            listener: Listener::new(),
+            speaks: Speaks::default(),
+            known: Box::new([None; 256]),
+            heard_damage: false,
             combined: Box::new([0; FAST_BYTES]),
             out: Box::new([0; FRAME_BYTES]),
             sent: 0,
@@ -110,6 +131,56 @@ impl Master {
     /// With something to tell of its port.
     pub fn with_notes(self, notes: Vec<String>) -> Self {
         Master { notes, ..self }
+    }
+
+    /// Speaking other protocols than 2.0 alone.
+    pub fn speaking(self, speaks: Speaks) -> Self {
+        Master { speaks, ..self }
+    }
+
+    /// Whether servo `id` is to be spoken to in Protocol 1.0; finds out where either is possible.
+    pub(super) fn is_one(&mut self, id: u8) -> Result<bool, ClientError> {
+        let known = match self.speaks {
+            Speaks::Only(protocol) => Some(protocol),
+            Speaks::Either if id == BROADCAST_ID => Some(Protocol::Two),
+            Speaks::Either => self.known[usize::from(id)],
+        };
+        if let Some(protocol) = known {
+            return Ok(protocol == Protocol::One);
+        }
+        match self.ping_either(id) {
+            Ok((_, protocol)) => Ok(protocol == Protocol::One),
+            Err(ClientError::Port(error)) => Err(error.into()),
+            // Nobody there, or out of its mind: what is asked next says so.
+            Err(_) => Ok(false),
+        }
+    }
+
+    /// Pings in Protocol 2.0, then in 1.0, and keeps who answers to what.
+    pub(super) fn ping_either(&mut self, id: u8) -> Result<(Ping, Protocol), ClientError> {
+        let found = match self.ping_two(id) {
+            Err(ClientError::Timeout { .. }) => (self.ping_one(id)?, Protocol::One),
+            answer => (answer?, Protocol::Two),
+        };
+        self.known[usize::from(id)] = Some(found.1);
+        Ok(found)
+    }
+
+    /// Notes who answered in Protocol 2.0.
+    pub(super) fn speak_two_to(&mut self, ids: &[bool; 256]) {
+        for (known, _) in self.known.iter_mut().zip(ids).filter(|(_, is)| **is) {
+            *known = Some(Protocol::Two);
+        }
+    }
+
+    /// Whether servo `id` is known to speak Protocol 2.0.
+    pub(super) fn is_two(&self, id: u8) -> bool {
+        self.known[usize::from(id)] == Some(Protocol::Two)
+    }
+
+    /// Notes who answered in Protocol 1.0.
+    pub(super) fn speak_one_to(&mut self, id: u8) {
+        self.known[usize::from(id)] = Some(Protocol::One);
     }
 
     /// Time of `bytes` on the line.
@@ -128,8 +199,7 @@ impl Master {
                 limit: capacity,
             }
         })?;
-        self.damaged += self.parser.buffered() as u64;
-        self.parser.clear();
+        self.damaged += self.listener.clear() as u64;
         if self.allowance.take_gave_up() {
             let mut late = [0; 256];
             let count = self.port.read(&mut late, 1, self.port.now())?;
@@ -187,28 +257,29 @@ impl Master {
         mut accept: impl FnMut(&Status<'_>) -> Accepted,
     ) -> Result<bool, ClientError> {
         loop {
-            while let Some(frame) = self.parser.next_frame() {
-                want = want.saturating_sub(frame.wire_len);
+            while let Some((accepted, len)) = self
+                .listener
                 // An adapter may echo our own instructions: no status, and no damage.
-                if let Ok(status) = Status::parse(&frame) {
-                    match accept(&status) {
-                        Accepted::Done => return Ok(true),
-                        Accepted::More => {}
-                        Accepted::Stranger => self.damaged += 1,
-                    }
+                .next(|status| status.map_or(Accepted::More, |status| accept(&status)))
+            {
+                want = want.saturating_sub(len);
+                match accepted {
+                    Accepted::Done => return Ok(true),
+                    Accepted::More => {}
+                    Accepted::Stranger => self.damaged += 1,
                 }
             }
             let mut chunk = [0; 512];
             let missing = want
-                .saturating_sub(self.parser.buffered())
-                .max(self.parser.missing())
+                .saturating_sub(self.listener.buffered())
+                .max(self.listener.missing())
                 .min(chunk.len());
             let count = self.port.read(&mut chunk, missing, deadline)?;
             if count == 0 {
                 return Ok(false);
             }
             self.received += count as u64;
-            self.parser.push(&chunk[..count]);
+            self.listener.push(&chunk[..count]);
         }
     }
 
@@ -237,7 +308,18 @@ impl Master {
         data: &mut [u8],
         latest: Option<Time>,
     ) -> Result<Reply, ClientError> {
-        let bytes = wire::status(data.len());
+        self.answer_within(id, data, wire::status(data.len()), latest)
+    }
+
+    /// Waits for the answer of `id`, which takes `bytes` on the line, until `latest` at most.
+    pub(super) fn answer_within(
+        &mut self,
+        id: u8,
+        data: &mut [u8],
+        bytes: usize,
+        latest: Option<Time>,
+    ) -> Result<Reply, ClientError> {
+        let waste = self.listener.waste();
         let asked_at = self.port.now();
         let due = self.due(1, bytes);
         let patient = due + self.allowance.get();
@@ -272,6 +354,7 @@ impl Master {
         } else {
             self.missed(due, true);
         }
+        self.heard_damage = self.listener.waste() > waste;
         result.unwrap_or_else(|| {
             let waited = self.port.now().saturating_since(asked_at);
             Err(ClientError::Timeout {

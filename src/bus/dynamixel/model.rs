@@ -4,6 +4,7 @@
 //! model is an entry in the catalogue and, where its registers differ, a table.
 
 pub mod address;
+mod ax;
 mod catalogue;
 mod current;
 mod layout;
@@ -19,7 +20,9 @@ pub use catalogue::XL430_W250;
 pub use layout::{IndirectBlock, Layout};
 pub use mode::{MODES, Mode};
 
+use super::one;
 use std::f64::consts::TAU;
+use std::fmt;
 
 /// Bytes from [`address::PRESENT_STATE`]: load or current, velocity, position.
 pub const STATE_BYTES: usize = 10;
@@ -88,7 +91,22 @@ pub struct Register {
     pub max: i64,
     /// What one count is, empty for plain numbers and flags.
     pub unit: &'static str,
+    /// How a negative value stands in it.
+    pub sign: Sign,
 }
+
+/// How a register holds negative values.
+#[derive(Copy, Clone, Debug, Default, PartialEq, Eq)]
+pub enum Sign {
+    /// As two's complement.
+    #[default]
+    TwosComplement,
+    /// As a magnitude of ten bits with the sign in bit 10, clockwise: speed and load of Protocol 1.0.
+    Bit10,
+}
+
+/// The sign of [`Sign::Bit10`].
+const BIT_10: i64 = 1 << 10;
 
 impl Register {
     /// Whether the register keeps its value without power and is locked while torque is on, on X series servos;
@@ -103,6 +121,13 @@ impl Register {
             .iter()
             .rev()
             .fold(0i64, |value, &byte| (value << 8) | i64::from(byte));
+        if self.sign == Sign::Bit10 {
+            let magnitude = unsigned & (BIT_10 - 1);
+            return match unsigned & BIT_10 {
+                0 => magnitude,
+                _ => -magnitude,
+            };
+        }
         let bits = 8 * u32::from(self.size);
         if self.min < 0 && bits < 64 && unsigned >= 1 << (bits - 1) {
             unsigned - (1 << bits)
@@ -113,6 +138,9 @@ impl Register {
 
     /// The bytes of `value`; the first [`size`](Self::size) count.
     pub fn encode(&self, value: i64) -> [u8; 4] {
+        if self.sign == Sign::Bit10 && value < 0 {
+            return ((value.abs() | BIT_10) as u32).to_le_bytes();
+        }
         // Two's complement: cutting to the low bytes is what the register holds.
         (value as u32).to_le_bytes()
     }
@@ -126,6 +154,15 @@ pub enum Protocol {
     /// Protocol 2.0.
     #[default]
     Two,
+}
+
+impl fmt::Display for Protocol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Protocol::One => "1.0",
+            Protocol::Two => "2.0",
+        })
+    }
 }
 
 /// What a servo tells of its effort (register 126), and with that what [`JointState::effort`](crate::base::JointState::effort) is.
@@ -212,6 +249,16 @@ impl Model {
             .find(|register| register.address == address)
     }
 
+    /// The register that does here what the one at `x_series` does on an X series servo, if there is one.
+    pub fn register_like(&self, x_series: u16) -> Option<&'static Register> {
+        match self.protocol {
+            Protocol::Two => self.register_at(self.layout.at(x_series)),
+            Protocol::One => {
+                one::counterpart(x_series).and_then(|address| self.register_at(address))
+            }
+        }
+    }
+
     /// Whether a register keeps its value without power and is locked while torque is on.
     pub const fn is_eeprom(&self, register: &Register) -> bool {
         self.layout.is_eeprom(register.address)
@@ -232,7 +279,7 @@ impl Model {
     pub fn goal_range(&self, mode: Mode) -> (i32, i32) {
         let turn = self.pulses_per_turn as i32;
         if mode.has_position_limits() {
-            match self.register("max_position_limit") {
+            match self.register_like(address::MAX_POSITION_LIMIT) {
                 Some(limit) => (limit.min as i32, limit.max as i32),
                 None => (0, turn - 1),
             }
@@ -263,6 +310,13 @@ pub static MODELS: &[&Model] = &[
     &catalogue::MX_64,
     &catalogue::MX_106,
     &catalogue::PH42_020_S300,
+    &ax::AX_12A,
+    &ax::AX_12W,
+    &ax::AX_18A,
+    &ax::MX_12W,
+    &ax::MX_28,
+    &ax::MX_64,
+    &ax::MX_106,
 ];
 
 #[cfg(test)]
@@ -312,7 +366,7 @@ mod tests {
             assert_eq!(limit, model.effort == Effort::Current, "{}", model.name);
             for mode in model.modes {
                 let (goal, _) = mode.goal();
-                let register = model.register_at(model.layout.at(goal));
+                let register = model.register_like(goal);
                 assert!(register.is_some(), "{}: no goal for {mode:?}", model.name);
                 assert!(limit || !mode.uses_current(), "{}: {mode:?}", model.name);
             }

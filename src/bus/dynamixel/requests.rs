@@ -1,13 +1,15 @@
-//! What a [`Master`] can be asked: the instructions of Protocol 2.0.
+//! What a [`Master`] can be asked: the instructions of Protocol 2.0; those of 1.0 are in [`one`](super::one).
 
 use super::client::{Client, ClientError, Outcome, Ping, Reply, Traffic};
 use super::group_read::Asked;
-use super::master::{Accepted, Master};
+use super::master::{Accepted, Master, Speaks};
+use super::model::Protocol;
 use crate::base::Time;
 use handwave_dynamixel::instruction::{
     Backup, BulkReadEntry, BulkWriteEntry, FactoryReset, SyncRead,
 };
 use handwave_dynamixel::lists::{encode_bulk_write, encode_sync_write};
+use handwave_dynamixel::p1 as one;
 use handwave_dynamixel::{BROADCAST_ID, Instruction, MAX_ID, wire};
 use std::time::Duration;
 
@@ -23,6 +25,50 @@ fn ping_reply(id: u8, alert: bool, params: &[u8]) -> Option<Ping> {
             alert,
         }),
         _ => None,
+    }
+}
+
+impl Master {
+    pub(super) fn ping_two(&mut self, id: u8) -> Result<Ping, ClientError> {
+        self.send(|buf| Instruction::Ping.encode(id, buf))?;
+        let mut params = [0; 3];
+        let reply = self.answer(id, &mut params)?;
+        Ok(Ping {
+            id,
+            model: u16::from_le_bytes([params[0], params[1]]),
+            firmware: params[2],
+            alert: reply.alert,
+        })
+    }
+
+    fn ping_all_two(&mut self, found: &mut dyn FnMut(Ping)) -> Result<(), ClientError> {
+        self.send(|buf| Instruction::Ping.encode(BROADCAST_ID, buf))?;
+        let ids = u32::from(MAX_ID) + 1;
+        let deadline = self.line_free_at
+            + (PING_SLOT + self.wire_time(wire::PING_STATUS)) * ids
+            + self.allowance.max();
+        self.receive(wire::PING_STATUS, deadline, |status| {
+            match ping_reply(status.id, status.alert, status.params) {
+                Some(ping) => {
+                    found(ping);
+                    Accepted::More
+                }
+                None => Accepted::Stranger,
+            }
+        })?;
+        Ok(())
+    }
+
+    /// Of a list, what its first servo speaks: the servos of a chain speak the same.
+    fn is_list_one(&mut self, ids: &[u8]) -> Result<bool, ClientError> {
+        ids.first().map_or(Ok(false), |&id| self.is_one(id))
+    }
+
+    fn only_two(&mut self, id: u8, what: &'static str) -> Result<(), ClientError> {
+        if self.is_one(id)? {
+            return Err(ClientError::NotInProtocolOne { id, what });
+        }
+        Ok(())
     }
 }
 
@@ -44,11 +90,10 @@ impl Client for Master {
     }
 
     fn traffic(&self) -> Traffic {
-        let parser = self.parser.damage();
         Traffic {
             sent: self.sent,
             received: self.received,
-            damaged: self.damaged + u64::from(parser.stray_bytes) + u64::from(parser.bad_crc),
+            damaged: self.damaged + self.listener.waste(),
         }
     }
 
@@ -78,7 +123,7 @@ impl Client for Master {
 
     fn reopen_port(&mut self, name: &str) -> Result<(), ClientError> {
         self.port.reopen(name)?;
-        self.parser.clear();
+        self.listener.clear();
         self.may_hold_stale = true;
         self.missed_due = None;
         self.line_free_at = self.port.now();
@@ -112,36 +157,32 @@ impl Client for Master {
     }
 
     fn ping(&mut self, id: u8) -> Result<Ping, ClientError> {
-        self.send(|buf| Instruction::Ping.encode(id, buf))?;
-        let mut params = [0; 3];
-        let reply = self.answer(id, &mut params)?;
-        Ok(Ping {
-            id,
-            model: u16::from_le_bytes([params[0], params[1]]),
-            firmware: params[2],
-            alert: reply.alert,
-        })
+        match self.speaks {
+            Speaks::Only(Protocol::Two) => self.ping_two(id),
+            Speaks::Only(Protocol::One) => self.ping_one(id),
+            Speaks::Either => self.ping_either(id).map(|(ping, _)| ping),
+        }
     }
 
     fn ping_all(&mut self, found: &mut dyn FnMut(Ping)) -> Result<(), ClientError> {
-        self.send(|buf| Instruction::Ping.encode(BROADCAST_ID, buf))?;
-        let ids = u32::from(MAX_ID) + 1;
-        let deadline = self.line_free_at
-            + (PING_SLOT + self.wire_time(wire::PING_STATUS)) * ids
-            + self.allowance.max();
-        self.receive(wire::PING_STATUS, deadline, |status| {
-            match ping_reply(status.id, status.alert, status.params) {
-                Some(ping) => {
-                    found(ping);
-                    Accepted::More
-                }
-                None => Accepted::Stranger,
-            }
-        })?;
-        Ok(())
+        if self.speaks != Speaks::Only(Protocol::One) {
+            let mut two = [false; 256];
+            self.ping_all_two(&mut |ping| {
+                two[usize::from(ping.id)] = true;
+                found(ping);
+            })?;
+            self.speak_two_to(&two);
+        }
+        match self.speaks {
+            Speaks::Only(Protocol::Two) => Ok(()),
+            Speaks::Only(Protocol::One) | Speaks::Either => self.ping_all_one(found),
+        }
     }
 
     fn read(&mut self, id: u8, address: u16, data: &mut [u8]) -> Result<Reply, ClientError> {
+        if self.is_one(id)? {
+            return self.read_one(id, address, data, None);
+        }
         let length = u16::try_from(data.len()).unwrap_or(u16::MAX);
         self.send(|buf| Instruction::Read { address, length }.encode(id, buf))?;
         self.answer(id, data)
@@ -154,36 +195,63 @@ impl Client for Master {
         data: &mut [u8],
         latest: Time,
     ) -> Result<Reply, ClientError> {
+        if self.is_one(id)? {
+            return self.read_one(id, address, data, Some(latest));
+        }
         let length = u16::try_from(data.len()).unwrap_or(u16::MAX);
         self.send(|buf| Instruction::Read { address, length }.encode(id, buf))?;
         self.answer_by(id, data, Some(latest))
     }
 
     fn write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError> {
+        if self.is_one(id)? {
+            return self.write_one(id, address, data);
+        }
         self.command(id, &Instruction::Write { address, data })
     }
 
     fn reboot(&mut self, id: u8) -> Result<Reply, ClientError> {
+        self.only_two(
+            id,
+            "restart it by an instruction: switch its power off and on",
+        )?;
         self.command(id, &Instruction::Reboot)
     }
 
     fn reg_write(&mut self, id: u8, address: u16, data: &[u8]) -> Result<Reply, ClientError> {
+        if self.is_one(id)? {
+            return self.reg_write_one(id, address, data);
+        }
         self.command(id, &Instruction::RegWrite { address, data })
     }
 
     fn action(&mut self, id: u8) -> Result<Reply, ClientError> {
+        if self.is_one(id)? {
+            return self.command_one(id, &one::Instruction::Action);
+        }
         self.command(id, &Instruction::Action)
     }
 
     fn clear_multi_turn(&mut self, id: u8) -> Result<Reply, ClientError> {
+        self.only_two(id, "clear its turns")?;
         self.command(id, &Instruction::ClearMultiTurn)
     }
 
     fn back_up(&mut self, id: u8, what: Backup) -> Result<Reply, ClientError> {
+        self.only_two(id, "keep a copy of its control table")?;
         self.command(id, &Instruction::Backup(what))
     }
 
     fn factory_reset(&mut self, id: u8, what: FactoryReset) -> Result<Reply, ClientError> {
+        if self.is_one(id)? {
+            return match what {
+                FactoryReset::All => self.command_one(id, &one::Instruction::FactoryReset),
+                _ => Err(ClientError::NotInProtocolOne {
+                    id,
+                    what: "keep its id or rate in a factory reset; it can reset all, and is id 1 at 1000000 baud then",
+                }),
+            };
+        }
         self.command(id, &Instruction::FactoryReset(what))
     }
 
@@ -194,6 +262,9 @@ impl Client for Master {
         ids: &[u8],
         data: &[u8],
     ) -> Result<(), ClientError> {
+        if self.is_list_one(ids)? {
+            return self.sync_write_one(address, length, ids, data);
+        }
         let size = usize::from(length).max(1);
         let items = ids.iter().copied().zip(data.chunks(size));
         self.send(|buf| encode_sync_write(buf, address, length, items))?;
@@ -216,6 +287,9 @@ impl Client for Master {
         data: &mut [u8],
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
+        if self.is_list_one(ids)? {
+            return self.sync_read_one(address, length, ids, data, outcomes);
+        }
         let list = SyncRead {
             address,
             length,
@@ -232,6 +306,9 @@ impl Client for Master {
         data: &mut [u8],
         outcomes: &mut [Outcome],
     ) -> Result<(), ClientError> {
+        if self.is_list_one(ids)? {
+            return self.sync_read_one(address, length, ids, data, outcomes);
+        }
         let list = SyncRead {
             address,
             length,

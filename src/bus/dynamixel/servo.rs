@@ -1,6 +1,6 @@
 //! One servo of a chain: what is declared of it, and joint coordinates to counts and back.
 
-use super::model::{Effort, Mode, Model, STATE_BYTES, address};
+use super::model::{Effort, Mode, Model, Protocol, STATE_BYTES, address};
 use super::settings::Settings;
 use crate::base::{JointState, Time};
 use std::fmt;
@@ -71,6 +71,26 @@ pub enum SpecError {
         first: String,
         /// The other joint.
         second: String,
+    },
+    /// Servos of both protocols on one line.
+    #[error(
+        "joint {first} has an {first_model}, which speaks Protocol {first_protocol}, joint {second} on the same bus an \
+         {second_model}, which speaks Protocol {second_protocol}: on one line they would take one another's frames for \
+         their own. Put them on two buses ([[bus]] in the configuration, a port each)"
+    )]
+    Protocol {
+        /// One joint.
+        first: String,
+        /// Its model.
+        first_model: &'static str,
+        /// What it speaks.
+        first_protocol: Protocol,
+        /// The other joint.
+        second: String,
+        /// Its model.
+        second_model: &'static str,
+        /// What it speaks.
+        second_protocol: Protocol,
     },
     /// The range is empty or not within what the mode has.
     #[error(
@@ -262,6 +282,28 @@ impl ServoSpec {
             effort: sign * f64::from(load) * self.model.effort_unit,
             measured_at: Some(measured_at),
         }
+    }
+}
+
+/// What the servos of a line speak; none of them: Protocol 2.0.
+///
+/// # Errors
+/// They do not speak the same.
+pub fn protocol_of(specs: &[ServoSpec]) -> Result<Protocol, SpecError> {
+    let Some((first, rest)) = specs.split_first() else {
+        return Ok(Protocol::Two);
+    };
+    let protocol = first.model.protocol;
+    match rest.iter().find(|other| other.model.protocol != protocol) {
+        None => Ok(protocol),
+        Some(other) => Err(SpecError::Protocol {
+            first: first.joint.clone(),
+            first_model: first.model.name,
+            first_protocol: protocol,
+            second: other.joint.clone(),
+            second_model: other.model.name,
+            second_protocol: other.model.protocol,
+        }),
     }
 }
 

@@ -113,7 +113,7 @@ impl Settings {
                 ));
             }
             let most = model
-                .register_at(model.layout.at(x_series))
+                .register_like(x_series)
                 .map_or(0, |register| register.max);
             if i64::from(value) > most {
                 return Err(format!(
@@ -175,7 +175,7 @@ impl Settings {
             ),
         ] {
             let most = model
-                .register_at(model.layout.at(x_series))
+                .register_like(x_series)
                 .map_or(0.0, |register| register.max as f64 * unit);
             if !(0.0..=most).contains(&value) {
                 return Err(format!(
@@ -194,7 +194,7 @@ fn most_current_a(model: &Model) -> f64 {
         return 0.0;
     }
     model
-        .register_at(address::CURRENT_LIMIT)
+        .register_like(address::CURRENT_LIMIT)
         .map_or(0.0, |register| register.max as f64 * model.effort_unit)
 }
 

@@ -1,7 +1,7 @@
 //! How one servo is at an instant, in one read: position, speed, effort, temperature, voltage, errors, torque.
 
 use super::client::{Client, ClientError};
-use super::model::{Model, Register, hardware_error};
+use super::model::{Model, Protocol, Register, address, hardware_error};
 
 /// Registers that tell how a servo is.
 const TORQUE: &str = "torque_enable";
@@ -56,8 +56,19 @@ impl Vitals {
             return Ok(Self::default());
         }
         let mut bytes = [0; LONGEST];
-        client.read(id, begin, &mut bytes[..length])?;
-        Ok(Self::decode(model, begin, &bytes[..length]))
+        let reply = client.read(id, begin, &mut bytes[..length])?;
+        let mut vitals = Self::decode(model, begin, &bytes[..length]);
+        if reply.alert && model.protocol == Protocol::One {
+            // No register of its own: they stand in every answer.
+            let mut errors = [0];
+            client.read(
+                id,
+                model.layout.at(address::HARDWARE_ERROR_STATUS),
+                &mut errors,
+            )?;
+            [vitals.errors] = errors;
+        }
+        Ok(vitals)
     }
 
     /// From the bytes of the registers from `begin` on; registers that lie outside are `None`.

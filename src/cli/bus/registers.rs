@@ -3,7 +3,7 @@
 use super::{IdList, open, say};
 use crate::base::suggest;
 use crate::bus::BusAddress;
-use crate::bus::dynamixel::model::{Access, Layout, address};
+use crate::bus::dynamixel::model::{Access, Layout, Sign, address};
 use crate::bus::dynamixel::{Client, Model, Register};
 use crate::cli::{ExitStatus, Failure};
 use clap::Args;
@@ -108,7 +108,7 @@ pub fn write(args: &WriteArgs, out: &mut dyn Write) -> Result<ExitStatus, Failur
         plan.push((id, servo.layout(), register));
     }
     for (id, layout, register) in plan {
-        if register.address == layout.at(address::TORQUE_ENABLE) && args.value == 1 {
+        if register.name == "torque_enable" && args.value == 1 {
             hold_position(&mut *client, id, layout)?;
         }
         let bytes = register.encode(args.value);
@@ -272,6 +272,7 @@ impl Servo {
                 min: 0,
                 max: (1 << (8 * u32::from(size))) - 1,
                 unit: "",
+                sign: Sign::TwosComplement,
             }),
             (_, Some(_)) => Err(wrong()),
         }

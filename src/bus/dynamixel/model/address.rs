@@ -54,6 +54,10 @@ pub const HOMING_OFFSET: u16 = of("homing_offset");
 pub const MOVING_THRESHOLD: u16 = of("moving_threshold");
 /// Temperature limit; voltage limits, PWM limit and current limit follow.
 pub const TEMPERATURE_LIMIT: u16 = of("temperature_limit");
+/// Max voltage limit.
+pub const MAX_VOLTAGE_LIMIT: u16 = of("max_voltage_limit");
+/// Min voltage limit.
+pub const MIN_VOLTAGE_LIMIT: u16 = of("min_voltage_limit");
 /// PWM limit.
 pub const PWM_LIMIT: u16 = of("pwm_limit");
 /// Current limit; not on models that report load.

@@ -11,19 +11,33 @@ use super::RAM_BEGIN;
 pub struct Layout {
     /// First address of RAM: torque enable.
     pub ram_begin: u16,
+    /// Added to addresses of the X series where the model has another kind of table: a client of Protocol 1.0 answers
+    /// there with what its registers mean ([`one`](crate::bus::dynamixel::one)). 0: the table is of the X series' kind.
+    pub window: u16,
 }
 
 impl Layout {
     /// X and MX series.
     pub const X: Layout = Layout {
         ram_begin: RAM_BEGIN,
+        window: 0,
     };
     /// P series.
-    pub const P: Layout = Layout { ram_begin: 512 };
+    pub const P: Layout = Layout {
+        ram_begin: 512,
+        window: 0,
+    };
+    /// Servos with Protocol 1.0. Their own addresses have one byte, so none of them is in the window.
+    pub const ONE: Layout = Layout {
+        ram_begin: 24,
+        window: 0x1000,
+    };
 
     /// This model's address of the register that lies at `x_series` on an X series servo.
     pub const fn at(self, x_series: u16) -> u16 {
-        if x_series < RAM_BEGIN {
+        if self.window > 0 {
+            self.window + x_series
+        } else if x_series < RAM_BEGIN {
             x_series
         } else {
             x_series - RAM_BEGIN + self.ram_begin
@@ -33,7 +47,9 @@ impl Layout {
     /// The X series' address of this model's `address`: the other way round. Addresses between the end of the common EEPROM
     /// and RAM (indirect addresses of the P series) have none and stay as they are.
     pub const fn x_series(self, address: u16) -> u16 {
-        if address < self.ram_begin {
+        if self.window > 0 {
+            address.saturating_sub(self.window)
+        } else if address < self.ram_begin {
             address
         } else {
             address - self.ram_begin + RAM_BEGIN

@@ -2,7 +2,7 @@
 //!
 //! All of it is computed when the crate is built.
 
-use super::{Access, Register};
+use super::{Access, Register, Sign};
 
 pub(super) const U8: i64 = 255;
 pub(super) const U16: i64 = 65_535;
@@ -27,6 +27,7 @@ pub(super) const fn r(
         min,
         max,
         unit,
+        sign: Sign::TwosComplement,
     }
 }
 

@@ -1,0 +1,4 @@
+//! See `noise_two` in the library.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| handwave_fuzz::noise_two(bytes));
